@@ -119,8 +119,14 @@ def symmetric(study):
     return capture(study, "symmetric-100", "--hmd symmetric-100")
 
 
+# The Z2 paper's machines.
+PAPER = "--caches 8/128,16/128,8/256,16/256"
+
+
 def measure(study, traces, *flags):
-    return labelled(study.json("orders", *traces, *flags)["rows"])
+    """Rows of `replay orders`, on the paper's machines unless a flag has others."""
+    caches = [] if any("--caches" in flag for flag in flags) else [PAPER]
+    return labelled(study.json("orders", *traces, *flags, *caches)["rows"])
 
 
 # Parts.
@@ -146,7 +152,7 @@ def displays(study, write):
         (most, label), display = max((worst(own), name) for name, own in of.items())
         worsts.append([order, most, label, display, max(row["change_pct"] for own in of.values() for row in own if can_change(row))])
     splits = [[name, *by_set(where(found[name], order=BEST)), one(correlation_of_sets(found[name]), 3)] for name in DISPLAYS]
-    detail = "tracegen raster SCENE --hmd DISPLAY, replay orders TRACES --orders ... --json: rows, change_pct"
+    detail = f"tracegen raster SCENE --hmd DISPLAY, replay orders TRACES --orders ... {PAPER} --json: rows, change_pct"
     offsets = " | ".join(f"{name}: {abs(int(found[name][0]['offset_tiles']))} tiles" for name in DISPLAYS)
     write("orders-displays", detail, f"order | state, bytes | tables, bytes | tile buffers | {offsets} | built-in scenes, symmetric", table)
     write("orders-worst", detail, "order | worst camera, % | camera | display | worst camera and caches, %", worsts)
@@ -160,7 +166,7 @@ def all_orders(study, write):
         misses = mean(row["l1_footprint_miss_pct"] for row in own)
         needs = [own[0][key] for key in ("state_bytes", "table_bytes", "look_ahead_items", "tile_buffers", "decision_cycles", "information")]
         table.append([order, change(own), *by_set(own), show_worst(own), one(misses, 2), *needs])
-    write("orders-all", "replay orders TRACES --json: rows", (
+    write("orders-all", f"replay orders TRACES {PAPER} --json: rows", (
         "order | all cameras, % | design, % | held out, % | worst camera, % | L1 misses, % | state, bytes | tables, bytes | look-ahead, items | "
         "tile buffers | decision, cycles | information"), table)
     print("rank correlation, all orders:", correlation_of_sets(every))
@@ -178,7 +184,7 @@ BOUNDS = [
 def cameras(study, write):
     flags = "--bounds --search greedy,greedy-64,anneal --moves 20000"
     rows = measure(study, symmetric(study), "--orders", ",".join(SEARCHED_ORDERS), flags)
-    detail = f"replay orders TRACES {flags} --json: rows, change_pct; means over the paper's four caches"
+    detail = f"replay orders TRACES {flags} {PAPER} --json: rows, change_pct"
     table = []
     for trace, own in by(rows, "trace").items():
         base = mean(row["external_mb_per_frame"] for row in where(own, order=BASE))
@@ -223,14 +229,14 @@ def frames(study, write):
                 table.append([learner["trace"].replace(",", ": "), f"8/{l2:.0f}", best, percent, learner["regret_pct"], learner["frame_best_pct"]])
         study.drop(*traces)
     table.append(["mean of all caches", "", "", mean_change(over), mean(regrets), ""])
-    write("orders-learned", "replay orders TRACE --learn --json: learned", (
+    write("orders-learned", f"replay orders TRACE --learn {PAPER} --json: learned", (
         "camera | caches, KiB | best fixed order | learned, against adaptive+sta+offset+boustro, % | regret, % | best order of each frame saves, %"), table)
     table = []
     for order, own in by(rows, "order").items():
         kept = where(own, between_frames="keep")
         table.append([order, *(change(where(own, between_frames=name)) for name in BETWEEN), *by_set(kept), show_worst(kept)])
     titles = ", % | ".join(BETWEEN.values())
-    write("orders-frames", f"tracegen raster SCENE --path head --frames 120, replay orders TRACE {between} --json: rows, change_pct",
+    write("orders-frames", f"tracegen raster SCENE --path head --frames 120, replay orders TRACE {between} {PAPER} --json: rows, change_pct",
           f"order | {titles}, % | kept: design, % | kept: held out, % | kept: worst camera, %", table)
 
 
@@ -295,7 +301,7 @@ def axes(study, write):
             setting, one(mean(row["external_mb_per_frame"] for row in of[BASE]), 3), change(of[BEST]), *by_set(of[BEST]), show_worst(of[BEST]),
             *(change(of[order]) for order in shown), change(settled), 100 * (geometric_mean(whole) - 1) if whole else ""])
     study.drop(*made[1])
-    write("orders-axes", "replay orders TRACES with the flag that the row names, --json: rows, change_pct", (
+    write("orders-axes", f"replay orders TRACES {PAPER} with the flag that the row names, --json: rows, change_pct", (
         f"changed setting | z2-sta, MB per frame | {BEST}, % | design, % | held out, % | worst camera, % | {', % | '.join(shown)}, % | "
         f"best of the first four curves, % | all clients: {BEST}, %"), table)
 
@@ -306,7 +312,7 @@ def speed(study, write):
     orders = list(by(measure(study, traces[:1], "--caches 8/128"), "order"))[:40]
     done = study.replay("orders --json --quiet --orders", ",".join(orders), *traces)
     replays = len(json.loads(done.out)["rows"])
-    write("orders-speed", "replay orders TRACES --json, timed by the study", (
+    write("orders-speed", f"replay orders TRACES {PAPER} --json, timed by the study", (
         "cameras | orders | pairs of caches | replays | processors | wall time, s | user time, s | system time, s"),
         [[len(traces), len(orders), 4, replays, os.cpu_count(), done.wall_s, done.user_s, done.system_s]])
 

@@ -11,7 +11,7 @@ use super::plots::bars::{BarChart, BarGroup};
 use super::plots::lines::Axis;
 use super::plots::scatter::{NamedPoint, ScatterChart};
 use super::plots::{PlotError, SeriesStyle};
-use super::table::Table;
+use super::table::{Style, Table};
 use super::theme;
 use maud::{Markup, html};
 use serde::Serialize;
@@ -267,11 +267,11 @@ impl Document for AccuracyReport {
         Table::new(&columns, &lines)
     }
 
-    fn text(&self) -> String {
-        let mut text = self.advice(true).text();
+    fn text(&self, style: Style) -> String {
+        let mut text = self.advice(true).styled(style);
         for measured in &self.studies {
             let Study { title, about, .. } = measured.study;
-            text += &format!("\n{title}: {about}\n{}", measured.table().text());
+            text += &format!("\n{title}: {about}\n{}", measured.table().styled(style));
         }
         text
     }
@@ -512,7 +512,11 @@ mod tests {
             csv.contains("estimate_pct,101,98.5,103.5,% of all"),
             "{csv}"
         );
-        assert!(report.text().contains("101.0 (98.5 to 103.5)"));
+        assert!(
+            report
+                .text(Style::Terminal)
+                .contains("101.0 (98.5 to 103.5)")
+        );
         assert!(report.page().unwrap().contains("one estimate each"));
     }
 

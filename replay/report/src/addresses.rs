@@ -3,7 +3,7 @@
 use super::columns::{Column, Columns, columns_of};
 use super::document::Document;
 use super::memory_columns;
-use super::table::Table;
+use super::table::{Style, Table};
 use serde::Serialize;
 use sim::addresses::{LevelCounts, Outcome, Point, Totals};
 use sim::config::LevelConfig;
@@ -163,7 +163,7 @@ impl Document for AddressesReport<'_> {
 
     /// The text: the counts of accesses, then the levels of a single configuration or one row for
     /// each of several.
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let Self { input, outcome } = self;
         let of = Accesses::new(&outcome.totals, outcome.unique_lines);
         let mut text = format!(
@@ -180,13 +180,13 @@ impl Document for AddressesReport<'_> {
             );
         }
         let all = self.rows().without_empty_columns();
-        let part = |keys: &[&str]| all.picked(keys.iter().copied()).text();
+        let part = |keys: &[&str]| all.picked(keys.iter().copied()).styled(style);
         if let [point] = outcome.points.as_slice() {
             for level in ["l1", "l2"] {
                 let keys = LEVEL.map(|key| format!("{level}.{key}"));
                 let kinds = KINDS.map(|kind| format!("{kind}.{level}_line_misses"));
                 let keys = keys.iter().chain(&kinds).map(String::as_str);
-                text += &format!("\n{}", all.picked(keys).text());
+                text += &format!("\n{}", all.picked(keys).styled(style));
             }
             let line_bytes = point.config.line_bytes;
             text += &format!("\nlines of {line_bytes} bytes\n{}", point.memory);

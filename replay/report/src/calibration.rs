@@ -4,7 +4,7 @@
 use super::columns::{Column, Columns, Row, columns_of};
 use super::document::Document;
 use super::lists::least;
-use super::table::Table;
+use super::table::{Style, Table};
 use serde::Serialize;
 use sim::config::RunConfig;
 use studies::experiment::{Objective, SceneFit, Setting, Trial, plain};
@@ -78,18 +78,18 @@ impl Document for CalibrationReport {
     }
 
     /// The trials, best first, and the figures of the chosen one by scene.
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let mut trials: Vec<&Trial> = self.trials.iter().collect();
         let rank = |trial: &Trial| trial.chosen_by.unwrap_or(f64::MAX);
         trials.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
-        let mut text = Table::new(&Trial::columns(), trials).text();
+        let mut text = Table::new(&Trial::columns(), trials).styled(style);
         if let Some(chosen) = self.chosen.and_then(|index| self.trials.get(index)) {
             let scenes = Table::new(&SceneFit::columns(), &chosen.scenes);
             text += &format!(
                 "\n{}: found by search among {}\n{}",
                 title(&chosen.settings),
                 self.trials.len(),
-                scenes.without_empty_columns().text()
+                scenes.without_empty_columns().styled(style)
             );
         }
         let best = |of: fn(&Trial) -> Option<f64>| {
@@ -125,7 +125,7 @@ mod tests {
         let trials = vec![trial(20, 2.0, 1.0), trial(24, 1.5, 3.0)];
         let report = CalibrationReport::new(RunConfig::default(), Objective::Surface, trials);
         assert_eq!(report.chosen, Some(1));
-        let text = report.text();
+        let text = report.text(Style::Terminal);
         assert!(
             text.contains("tmu.loop_cycles=24: found by search among 2"),
             "{text}"

@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Columns, Row, Value, columns_of};
 use super::document::Document;
-use super::table::Table;
+use super::table::{Style, Table};
 use formats::textrace::TraceMeta;
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
@@ -133,7 +133,7 @@ impl Document for CompareReport<'_> {
         vec![("replayed", Table::new(&Replayed::columns(), &[]))]
     }
 
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let mut text = String::new();
         for (name, side) in ["A", "B"].iter().zip(&self.sides) {
             let Side { trace, meta } = side;
@@ -147,13 +147,13 @@ impl Document for CompareReport<'_> {
             "{} of {} tiles differ\n\n{}\n",
             of.tiles_that_differ,
             of.tiles,
-            self.classes().text()
+            self.classes().styled(style)
         );
         let materials = self.materials();
         if !materials.rows.is_empty() {
-            text += &format!("Materials that differ most\n{}\n", materials.text());
+            text += &format!("Materials that differ most\n{}\n", materials.styled(style));
         }
-        text + &self.rows().without_empty_columns().text()
+        text + &self.rows().without_empty_columns().styled(style)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a command found, in every form in which it is written.
 
-use crate::table::Table;
+use crate::table::{Style, Table};
 use serde::Serialize;
 use sim::figure::Figure;
 use sim::model_version::MODEL_VERSION;
@@ -39,20 +39,25 @@ pub trait Document {
     }
 
     /// The main table for a terminal, and tables that a flag asks for.
-    fn text(&self) -> String;
+    fn text(&self, style: Style) -> String;
 
     /// The other tables for a terminal.
-    fn details(&self) -> String {
+    fn details(&self, _: Style) -> String {
         String::new()
     }
 
-    /// The text for a terminal.
-    fn terminal(&self, with_details: bool) -> String {
-        let answer = self.answer();
-        let lines: Vec<String> = answer.iter().map(|s| wrapped(s, LINE_CHARS)).collect();
-        let parts = [lines.join("\n"), self.text()].into_iter();
+    /// The answer and the tables.
+    fn terminal(&self, style: Style, with_details: bool) -> String {
+        let answer = match style {
+            Style::Terminal => {
+                let lines = self.answer().into_iter().map(|s| wrapped(&s, LINE_CHARS));
+                lines.collect::<Vec<_>>().join("\n")
+            }
+            Style::Markdown => self.answer().join("\n\n"),
+        };
+        let parts = [answer, self.text(style)].into_iter();
         let more = match (with_details, Self::HAS_DETAILS) {
-            (true, _) => self.details(),
+            (true, _) => self.details(style),
             (false, true) => "(more tables: --details)".to_owned(),
             (false, false) => String::new(),
         };
@@ -60,7 +65,11 @@ pub trait Document {
             .map(|part| part.trim_matches('\n').to_owned())
             .filter(|part| !part.is_empty())
             .collect();
-        parts.join("\n\n") + "\n"
+        let mut text = parts.join("\n\n") + "\n";
+        while style == Style::Markdown && text.contains("\n\n\n") {
+            text = text.replace("\n\n\n", "\n\n");
+        }
+        text
     }
 
     /// Texts of [`Self::CSV_FILES`].
@@ -169,7 +178,7 @@ mod tests {
             Table::default()
         }
 
-        fn text(&self) -> String {
+        fn text(&self, _: Style) -> String {
             "table\n".to_owned()
         }
 
@@ -185,7 +194,10 @@ mod tests {
 
     #[test]
     fn the_text_begins_with_the_answer_in_lines_that_fit() {
-        assert_eq!(Doubtful(None).terminal(false), "One.\nTwo.\n\ntable\n");
+        assert_eq!(
+            Doubtful(None).terminal(Style::Terminal, false),
+            "One.\nTwo.\n\ntable\n"
+        );
         assert_eq!(wrapped("one two three", 8), "one two\nthree");
         assert_eq!(wrapped("overlong", 3), "overlong");
     }

@@ -6,7 +6,7 @@ use super::html::{Answer, Page, figure, figures, settings};
 use super::lists::{geometric_mean, least};
 use super::plots::lines::{Axis, LineChart, LineSeries};
 use super::plots::{PlotError, SeriesStyle};
-use super::table::Table;
+use super::table::{Style, Table};
 use maud::{Markup, html};
 use serde::{Serialize, Serializer};
 use sgrt::config::SgrtConfig;
@@ -144,11 +144,11 @@ impl Document for ReadingsReport {
     }
 
     /// The tables for a terminal.
-    fn text(&self) -> String {
-        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
+    fn text(&self, style: Style) -> String {
+        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().styled(style);
         if let Some(index) = self.chosen {
             out += "\nThe closest reading, scene by scene\n";
-            out += &self.closest(index).text();
+            out += &self.closest(index).styled(style);
         }
         out
     }

@@ -5,7 +5,7 @@ use super::columns::{Column, Columns, Row, Show, Value, columns_of};
 use super::document::{Document, Envelope};
 use super::errors::{self, KnownError, Of};
 use super::figures::figures;
-use super::table::Table;
+use super::table::{Style, Table};
 use serde::Serialize;
 use sim::config::RunConfig;
 use sim::model_version::MODEL_VERSION;
@@ -81,12 +81,12 @@ impl Document for RunReport<'_> {
         answer(self.row)
     }
 
-    fn text(&self) -> String {
-        text(self.row, self.by_texture)
+    fn text(&self, style: Style) -> String {
+        text(self.row, self.by_texture, style)
     }
 
-    fn details(&self) -> String {
-        details(self.row)
+    fn details(&self, style: Style) -> String {
+        details(self.row, style)
     }
 }
 
@@ -117,9 +117,9 @@ impl Document for ModesReport<'_> {
         answer(self.0[0])
     }
 
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let [timed, functional] = self.0;
-        modes_text(timed, functional)
+        modes_text(timed, functional, style)
     }
 
     /// Without versions of its own, because both modes have theirs.
@@ -148,7 +148,7 @@ pub(crate) fn answer(row: &ResultRow) -> Vec<String> {
 
 /// One result as tables: levels, the draws or (if `by_texture`) the textures with most misses, tiles if they were
 /// counted, and what the machine's other parts counted.
-fn text(row: &ResultRow, by_texture: bool) -> String {
+fn text(row: &ResultRow, by_texture: bool, style: Style) -> String {
     let result = row.result;
     let level: Vec<Column<(&str, &LevelResult)>> = vec![
         Column::text("level", "", |l: &(&str, _)| l.0),
@@ -173,31 +173,31 @@ fn text(row: &ResultRow, by_texture: bool) -> String {
         ),
     ];
     let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
-    let mut text = levels.text();
+    let mut text = levels.styled(style);
     if by_texture || !result.by_draw.is_empty() {
         let (kind, parts) = result.parts();
-        text += &busiest(kind, parts);
+        text += &busiest(kind, parts, style);
     }
     if !result.tile_maps.is_empty() {
-        text += &tiles(&result.tile_maps);
+        text += &tiles(&result.tile_maps, style);
     }
     text += &result.memory.to_string();
     if !result.clients.is_empty() {
-        text += &format!("\n{}", clients(row).text());
+        text += &format!("\n{}", clients(row).styled(style));
     }
     text
 }
 
 /// Views, the figures of the whole replay, and known errors.
-fn details(row: &ResultRow) -> String {
+fn details(row: &ResultRow, style: Style) -> String {
     let result = row.result;
     let mut text = format!(
         "{} ({}), {}\n\n{}\n{}\nquads {}, covered pixels {}, access hash {}\n",
         row.subject.id.scene,
         row.subject.id.checksum,
         row.point.config.order.name(),
-        Table::new(&Part::columns(), &result.by_view).text(),
-        whole(row).text().trim_start(),
+        Table::new(&Part::columns(), &result.by_view).styled(style),
+        whole(row).styled(style).trim_start(),
         result.quads,
         result.lanes,
         result.access_hash,
@@ -214,7 +214,7 @@ fn details(row: &ResultRow) -> String {
     if let Some(tmu) = &result.tmu {
         text += &format!("{} loops of threads that missed\n", tmu.loops);
     }
-    text + &errors::text(Of::Textures)
+    text + &errors::text(Of::Textures, style)
 }
 
 /// Traffic by memory client, and the total.
@@ -309,7 +309,7 @@ const MEASURES: [Measure; 3] = [
 ];
 
 /// Both modes of a point side by side.
-fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
+fn modes_text(timed: &ResultRow, functional: &ResultRow, style: Style) -> String {
     let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
         let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
         format!("{:.*} {unit}", decimals, scale * value(row.result))
@@ -322,14 +322,14 @@ fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
             let [timed, functional] = [timed, functional].map(|row| m.4(row.result));
             format!("{:+.2} %", 100.0 * difference(timed, functional))
         });
-    Table::new(&columns, &MEASURES).text()
+    Table::new(&columns, &MEASURES).styled(style)
 }
 
 /// Number of parts in the table of parts with most misses.
 const BUSIEST_PARTS: usize = 10;
 
 /// The draws or textures with the most line misses of the L2.
-fn busiest(kind: &str, parts: &[Part]) -> String {
+fn busiest(kind: &str, parts: &[Part], style: Style) -> String {
     let mut busiest: Vec<&Part> = parts.iter().collect();
     busiest.sort_by_key(|part| std::cmp::Reverse((part.l2.line_misses, part.l1.footprints)));
     busiest.truncate(BUSIEST_PARTS);
@@ -338,11 +338,14 @@ fn busiest(kind: &str, parts: &[Part]) -> String {
         0 => String::new(),
         more => format!("and {more} more {kind}s (--json lists all)\n"),
     };
-    format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
+    format!(
+        "\n{}{more}",
+        Table::new(&Part::columns(), &rows).styled(style)
+    )
 }
 
 /// The counts of every tile, pass by pass and row by row.
-fn tiles(maps: &[TileMap]) -> String {
+fn tiles(maps: &[TileMap], style: Style) -> String {
     type Tile<'a> = (&'a TileMap, usize);
     let tiles: Vec<Tile> = maps
         .iter()
@@ -372,7 +375,7 @@ fn tiles(maps: &[TileMap]) -> String {
             map.l2_misses[*tile].into()
         }),
     ];
-    format!("\n{}", Table::new(&columns, &tiles).text())
+    format!("\n{}", Table::new(&columns, &tiles).styled(style))
 }
 
 /// The schema of the JSON object of both modes.

@@ -4,7 +4,7 @@
 use super::answers::{self, Sampled};
 use super::columns::{Columns, columns_of};
 use super::document::Document;
-use super::table::Table;
+use super::table::{Style, Table};
 use serde::Serialize;
 use sim::figure::Figure;
 use studies::sampling::of::Of;
@@ -191,10 +191,10 @@ impl Document for SampleReport {
         parts.into_iter().flatten().collect()
     }
 
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         match self.rows.is_empty() {
             true => String::new(),
-            false => self.rows().text(),
+            false => self.rows().styled(style),
         }
     }
 }
@@ -257,8 +257,8 @@ impl Document for TrialReport {
         Table::new(&columns, &self.rows)
     }
 
-    fn text(&self) -> String {
-        self.rows().text()
+    fn text(&self, style: Style) -> String {
+        self.rows().styled(style)
     }
 }
 

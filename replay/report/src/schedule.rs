@@ -3,7 +3,7 @@
 use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::lists::{geometric_mean, unique};
-use super::table::Table;
+use super::table::{Style, Table};
 use frame::schedulers::{Hardware, Scheduler, bits};
 use frame::{Figures, FrameTime, Settings};
 use serde::Serialize;
@@ -252,7 +252,7 @@ impl Document for ScheduleReport {
     }
 
     #[rustfmt::skip]
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let waits = |c: &frame::CoreCycles| c.mshr + c.dram + c.l2;
         let several = self.rows.iter().any(|row| row.trace != self.rows[0].trace);
         let columns = columns_of::<ScheduleRow>()
@@ -269,6 +269,6 @@ impl Document for ScheduleReport {
             .real("other", "rest", "%", 0, move |r| r.share(|c| c.all() - c.issue - c.texture - waits(c)))
             .real("bits", "bits", "", 0, |r| r.bits as f64);
         let table = Table::new(&columns, &self.rows).without_empty_columns();
-        table.text()
+        table.styled(style)
     }
 }

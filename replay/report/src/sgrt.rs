@@ -10,7 +10,7 @@ use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::html::{Answer, Page, figure as html_figure, settings};
 use crate::plots::{PlotError, data_uri};
-use crate::table::Table;
+use crate::table::{Style, Table};
 use maud::{Markup, html};
 use serde::Serialize;
 use sgrt::result::Report;
@@ -170,22 +170,23 @@ impl Document for ReprojectReport {
         let mut out = sentences(&self.entries);
         if let Some(entry) = self.entries.first() {
             let (config, [width, height]) = (&entry.report.config, entry.report.eye_size_px);
-            out.push(format!(
-                "Machine: mobile ray-tracing GPU, {} timing; rule {}, reuse of {}; {width}x{height} pixels an eye.",
+            let machine = format!(
+                "Machine: mobile ray-tracing GPU, {} timing; {width}x{height} pixels per eye; rule {}, reuse of {}.",
                 config.timing.name(),
                 config.rule,
                 name(&config.reuse)
-            ));
+            );
+            out.insert(1, machine);
         }
         out
     }
 
-    fn text(&self) -> String {
-        text(&self.entries)
+    fn text(&self, style: Style) -> String {
+        text(&self.entries, style)
     }
 
-    fn details(&self) -> String {
-        details(&self.entries)
+    fn details(&self, style: Style) -> String {
+        details(&self.entries, style)
     }
 
     /// One object for each trace; those of several traces have a line each.
@@ -212,7 +213,7 @@ impl Parts {
 }
 
 /// The main table, and those that a flag asks for.
-fn text(entries: &[Entry]) -> String {
+fn text(entries: &[Entry], style: Style) -> String {
     let keys = [
         "scene",
         "run",
@@ -226,29 +227,29 @@ fn text(entries: &[Entry]) -> String {
     ];
     let table = tables::rows(entries).picked(keys).without_empty_columns();
     let mut out = Parts::default();
-    out.push("Against tracing both eyes in full", &table.text());
+    out.push("Against tracing both eyes in full", &table.styled(style));
     for entry in entries {
         let scene = tables::scene_name(&entry.report);
         if !entry.report.curve.is_empty() {
             let title = format!("Cycles against error: {scene}");
-            out.push(&title, &tables::curve(&entry.report).text());
+            out.push(&title, &tables::curve(&entry.report).styled(style));
         }
         if !entry.report.sensitivity.is_empty() {
             let title = format!("Sensitivity: {scene}");
-            out.push(&title, &tables::sensitivity(&entry.report).text());
+            out.push(&title, &tables::sensitivity(&entry.report).styled(style));
         }
     }
     out.0
 }
 
 /// The other tables.
-fn details(entries: &[Entry]) -> String {
+fn details(entries: &[Entry], style: Style) -> String {
     let mut out = Parts::default();
     let mut part = |title: &str, table: String| out.push(title, &table);
     part("Stereo reprojection", tables::rule_line(entries));
     part(
         "Performance and energy",
-        tables::performance(entries).text(),
+        tables::performance(entries).styled(style),
     );
     if let Some(line) = tables::mean_reuse_line(entries) {
         part("Average reuse", line);
@@ -256,13 +257,19 @@ fn details(entries: &[Entry]) -> String {
     for note in tables::row_notes(entries) {
         part("Rows", note);
     }
-    part("Reuse and image error", tables::accuracy(entries).text());
-    part("Right pixels by class", tables::classes(entries).text());
-    part("Bytes moved", tables::traffic(entries).text());
+    part(
+        "Reuse and image error",
+        tables::accuracy(entries).styled(style),
+    );
+    part(
+        "Right pixels by class",
+        tables::classes(entries).styled(style),
+    );
+    part("Bytes moved", tables::traffic(entries).styled(style));
     if let Some(table) = cycle_table::units(entries) {
-        part(cycle_table::TITLE, table.text());
+        part(cycle_table::TITLE, table.styled(style));
     }
-    out.0.trim_end().to_owned() + "\n" + &errors::text(Of::Rays)
+    out.0.trim_end().to_owned() + "\n" + &errors::text(Of::Rays, style)
 }
 
 fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {

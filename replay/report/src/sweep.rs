@@ -11,7 +11,7 @@ use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;
 use super::plots::lines::{self, Doublings, LineChart, LineSeries};
 use super::plots::{PlotError, SeriesStyle};
-use super::table::Table;
+use super::table::{Style, Table};
 use super::theme;
 use maud::html;
 use serde::Serialize;
@@ -199,8 +199,8 @@ impl Document for SweepReport<'_> {
         self.sentences()
     }
 
-    fn text(&self) -> String {
-        self.table(true).text()
+    fn text(&self, style: Style) -> String {
+        self.table(true).styled(style)
     }
 }
 

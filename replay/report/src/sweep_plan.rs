@@ -3,7 +3,7 @@
 use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::sweep::LabelledTrace;
-use super::table::Table;
+use super::table::{Style, Table};
 use rayon::prelude::*;
 use serde::Serialize;
 use studies::experiment::{Plan, Point, Store, Subject, Task, point_key};
@@ -71,7 +71,7 @@ impl Document for SweepPlan<'_> {
         Table::new(&columns, &self.plan.points)
     }
 
-    fn text(&self) -> String {
+    fn text(&self, _: Style) -> String {
         let titles: Vec<String> = self.plan.points.iter().map(Point::title).collect();
         titles.join("\n")
     }

@@ -8,6 +8,15 @@ use std::borrow::Cow;
 /// Longer texts are wrapped on pages.
 const LONGEST_LINE_CHARS: usize = 60;
 
+/// How a text has its tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Aligned columns.
+    Terminal,
+    /// Tables of GitHub's Markdown.
+    Markdown,
+}
+
 /// Cells under headings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
@@ -117,6 +126,37 @@ impl Table {
 
     fn begins_group(&self, row: usize) -> bool {
         row > 0 && self.rows[row - 1][..self.groups] != self.rows[row][..self.groups]
+    }
+
+    /// As text in a style.
+    pub fn styled(&self, style: Style) -> String {
+        match style {
+            Style::Terminal => self.text(),
+            Style::Markdown => self.markdown(),
+        }
+    }
+
+    /// As a table of GitHub's Markdown between empty lines. Units stand behind the headings.
+    fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| {
+            let cells = cells.iter().map(|cell| cell.replace('|', "\\|"));
+            format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
+        };
+        let heading = |h: &Heading| match h.unit {
+            "" => printable(&h.name).into_owned(),
+            unit => format!("{}, {unit}", printable(&h.name)),
+        };
+        let side = |h: &Heading| match h.show {
+            Show::Text => "---".to_owned(),
+            _ => "---:".to_owned(),
+        };
+        let mut out = "\n".to_owned();
+        out += &line(self.headings.iter().map(heading).collect());
+        out += &line(self.headings.iter().map(side).collect());
+        for cells in self.cells() {
+            out += &line(cells);
+        }
+        out + "\n"
     }
 
     /// As text for a terminal. Lines are not wrapped, so the output can be piped and compared.
@@ -303,6 +343,14 @@ mod tests {
         assert_eq!(
             table(&ROWS).text(),
             "order   L1 miss  paper\n              %      %\nmorton    16.14  16.14\n\nz2-sta     9.81\n"
+        );
+    }
+
+    #[test]
+    fn markdown_has_units_in_headings_and_escapes_bars() {
+        assert_eq!(
+            table(&[("a|b", 9.814, None)]).styled(Style::Markdown),
+            "\n| order | L1 miss, % | paper, % |\n| --- | ---: | ---: |\n| a\\|b | 9.81 |  |\n\n"
         );
     }
 

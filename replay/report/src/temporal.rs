@@ -4,7 +4,7 @@ use super::answers::{self, Scheme};
 use super::columns::{Columns, columns_of, name};
 use super::document::Document;
 use super::lists::{self, geometric_mean};
-use super::table::Table;
+use super::table::{Style, Table};
 use serde::Serialize;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
@@ -110,7 +110,7 @@ impl Document for TemporalReport {
     }
 
     /// The main columns, and what the schemes are.
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let schemes = "\
 full: both eyes are traced
 stereo: the right eye from the left one
@@ -126,10 +126,10 @@ both: the left eye from its previous frame, the right eye from the left one";
             "relative_energy_least",
             "relative_energy_most",
         ];
-        format!("{}\n{schemes}\n", self.rows().picked(keys).text())
+        format!("{}\n{schemes}\n", self.rows().picked(keys).styled(style))
     }
 
-    fn details(&self) -> String {
-        self.rows().text()
+    fn details(&self, style: Style) -> String {
+        self.rows().styled(style)
     }
 }

@@ -133,7 +133,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     write(&report, &size, &args.output)?;
-    super::print(&report.text())?;
+    super::print(&report.text(report::table::Style::Terminal))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -311,6 +311,24 @@ impl ConfigArgs {
         }
     }
 
+    /// The same on this preset.
+    pub(super) fn on(&self, preset: Preset) -> Self {
+        Self {
+            preset: Some(preset),
+            ..self.clone()
+        }
+    }
+
+    /// Whether a preset or a file is given.
+    pub(super) fn has_base(&self) -> bool {
+        self.preset.is_some() || self.config.is_some()
+    }
+
+    /// Whether `--dram` is given.
+    pub(super) fn has_dram(&self) -> bool {
+        self.dram.is_some()
+    }
+
     /// The parts of `--count-by`, if given.
     pub(super) fn counts_by(&self) -> Option<CountBy> {
         self.count_by

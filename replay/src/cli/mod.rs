@@ -115,6 +115,7 @@ enum Command {
     #[command(mut_args(without(&["order", "l3", "prefetch", "dram", "frame"])))]
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
+    #[command(visible_alias = "sgrt")]
     Reproject(Box<reproject::ReprojectArgs>),
     /// Set every reading of the SGRT paper's figure 3 beside the paper.
     #[command(mut_args(without(&["details"])))]

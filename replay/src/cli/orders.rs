@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use report::orders::{LearnedTrace, OrdersReport};
 use shell::Progress;
 use sim::config::{BetweenFrames, Mode, Order, RunConfig};
-use sim::preset::{Machine, Preset};
+use sim::preset::Preset;
 use sim::size::format_bytes;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -22,8 +22,14 @@ use studies::orders_study::{
     BASELINE, Corners, OrderFile, OrdersStudy, Searched, Subjects, default_orders,
 };
 
-/// The default of `--caches`: the paper's machines.
+/// The default of `--caches` for machines without caches of their own: the paper's.
 const CACHES: &str = "8/128,16/128,8/256,16/256";
+
+/// The machine without `--preset`, `--config` and `--caches`: a present headset's.
+const PRESET: Preset = Preset::ADRENO_740;
+
+/// Orders that are replayed over the ranges of a machine, besides the baseline and Morton, if none are listed.
+const FINALISTS: usize = 3;
 
 /// Stands for the orders that the study knows: every curve and every part.
 const ALL: &str = "all";
@@ -40,7 +46,8 @@ const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,ba
   replay orders head.textrace --between keep,lose-50,flush --orders z2-sta,zig-zag+sta+offset+boustro
   replay orders head.textrace --learn
   replay orders a.textrace --search anneal --moves 1000000 --save-orders searched
-  replay orders a.textrace --preset adreno-740 --orders morton,z2-sta,zig-zag+sta+offset
+  replay orders a.textrace --preset mali-g715 --orders morton,z2-sta,zig-zag+sta+offset
+  replay orders a.textrace --caches 8/128,16/128,8/256,16/256
   replay orders a.textrace --mode timed --dram lpddr4 --orders z2-sta,zig-zag+sta+offset
 docs/models/orders.md explains the parts of an order, docs/results/orders.md has results.")]
 pub struct Args {
@@ -53,7 +60,8 @@ pub struct Args {
     /// [default: all, which has every named order, every curve and every part]
     #[arg(long, value_name = "ORDERS")]
     orders: Option<String>,
-    /// L1/L2 sizes in KiB, comma-separated [default: those of a --preset with caches, else 8/128,16/128,8/256,16/256]
+    /// L1/L2 sizes in KiB, comma-separated. Without them, --preset, --config and --learn, the machine is adreno-740
+    /// [default: those of a --preset with caches, else 8/128,16/128,8/256,16/256]
     #[arg(long, value_name = "L1/L2,...")]
     caches: Option<String>,
     /// What happens to caches between frames, comma-separated: keep, flush, lose-N
@@ -105,9 +113,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 .collect::<Vec<_>>(),
         )?,
     };
-    let corners = study.corners.as_ref().map_or(0, |all| all.configs.len());
-    let machines = study.caches_bytes.len() + corners;
-    let replays = opened.len() * study.orders.len() * machines * study.between.len();
+    let replays = opened.len() * study.replays_per_trace();
     let progress = Progress::new("replaying", replays as u64, "replays");
     let (rows, searched, work) = study.run(&subjects, &|done| progress.advance(done))?;
     drop(progress);
@@ -138,8 +144,17 @@ fn study(args: &Args) -> Result<OrdersStudy> {
         mode: Mode::Functional,
         ..RunConfig::default()
     };
-    let base = args.machine.resolve_over(usual)?;
-    let machine = args.machine.preset().and_then(Preset::machine);
+    // The learner counts caches of 4 ways, as the default ones.
+    let is_open = args.caches.is_none() && args.learn.is_none() && !args.machine.has_base();
+    let chosen = match is_open {
+        true => args.machine.on(PRESET),
+        false => args.machine.clone(),
+    };
+    let mut base = chosen.resolve_over(usual)?;
+    if is_open && base.mode == Mode::Functional && !args.machine.has_dram() {
+        base.dram = None;
+    }
+    let machine = chosen.preset().and_then(Preset::machine);
     refuse_varied(&base, &machine.map_or(usual, |machine| machine.over(usual)))?;
     ensure!(
         base.between_frames == usual.between_frames,
@@ -156,7 +171,7 @@ fn study(args: &Args) -> Result<OrdersStudy> {
     };
     let mut study = OrdersStudy {
         base,
-        corners: corners(args, machine, usual)?,
+        corners: corners(args, &chosen, usual)?,
         caches_bytes,
         between: parse_between(&args.between)?,
         orders,
@@ -177,18 +192,32 @@ fn study(args: &Args) -> Result<OrdersStudy> {
 }
 
 /// The corners of the ranges of a machine. `--caches` leaves no size to vary.
-fn corners(args: &Args, machine: Option<&Machine>, usual: RunConfig) -> Result<Option<Corners>> {
+fn corners(args: &Args, chosen: &ConfigArgs, usual: RunConfig) -> Result<Option<Corners>> {
+    let machine = chosen.preset().and_then(Preset::machine);
     let Some(machine) = machine.filter(|_| args.caches.is_none()) else {
         return Ok(None);
     };
-    let configs = args.machine.resolve_corners(usual)?;
+    let mut configs = chosen.resolve_corners(usual)?;
+    // Only bytes are compared there, and a functional replay counts the same without DRAM.
+    for config in configs
+        .iter_mut()
+        .filter(|config| config.mode == Mode::Functional)
+    {
+        config.dram = None;
+    }
+    configs.dedup();
     let over = format!(
         "{} corners of {}: {}",
         configs.len(),
         machine.name,
         machine.ranges_text()
     );
-    Ok((!configs.is_empty()).then_some(Corners { configs, over }))
+    let finalists = args.orders.is_none().then_some(FINALISTS);
+    Ok((!configs.is_empty()).then_some(Corners {
+        configs,
+        over,
+        finalists,
+    }))
 }
 
 /// Parses comma-separated orders. Here `all` also has every curve and part, not only the orders with a name.

@@ -6,7 +6,7 @@ use clap::Arg;
 use report::document::Document;
 use report::parquet;
 use report::plots::PlotError;
-use report::table::Table;
+use report::table::{Style, Table};
 use shell::{Output, is_stdout};
 use std::path::{Path, PathBuf};
 
@@ -52,6 +52,26 @@ pub(super) struct Outputs {
     /// Also print the tables below the main one: parts, all figures, known errors
     #[arg(long, conflicts_with = "json")]
     details: bool,
+    #[command(flatten)]
+    style: StyleArg,
+}
+
+/// The flag `--markdown`.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct StyleArg {
+    /// Print the tables as Markdown
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+}
+
+impl StyleArg {
+    /// The style of the tables.
+    pub fn style(&self) -> Style {
+        match self.markdown {
+            true => Style::Markdown,
+            false => Style::Terminal,
+        }
+    }
 }
 
 /// `--csv` of a command whose traces may follow the flag.
@@ -110,7 +130,7 @@ impl Outputs {
         match (prints, self.json) {
             (false, _) => Ok(()),
             (true, true) => super::print(&document.json()?),
-            (true, false) => super::print(&document.terminal(self.details)),
+            (true, false) => super::print(&document.terminal(self.style.style(), self.details)),
         }
     }
 }

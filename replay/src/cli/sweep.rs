@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use super::experiment_args::refuse_sizes;
-use super::outputs::ParquetArg;
+use super::outputs::{ParquetArg, StyleArg};
 use super::subjects::Traces;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -51,6 +51,8 @@ pub struct Args {
     /// Print one JSON object (schema replay.sweep/3, with --plan replay.plan/2)
     #[arg(long, conflicts_with_all = ["emit_slurm"])]
     json: bool,
+    #[command(flatten)]
+    style: StyleArg,
     #[command(flatten)]
     parquet: ParquetArg,
     /// Print the points and stop; with --json also their keys, their costs and which are done
@@ -344,7 +346,7 @@ impl<'a> Sweep<'a> {
         match (prints, self.args.json) {
             (false, _) => Ok(()),
             (true, true) => super::print(&json),
-            (true, false) => super::print(&report.terminal(false)),
+            (true, false) => super::print(&report.terminal(self.args.style.style(), false)),
         }
     }
 

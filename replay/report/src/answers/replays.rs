@@ -4,6 +4,7 @@ use crate::html::count;
 use crate::lists::unique;
 use sim::config::RunConfig;
 use sim::figure::Figure;
+use sim::preset::Preset;
 use sim::size::format_bytes;
 use studies::sampling::of::Of;
 
@@ -85,8 +86,14 @@ pub fn machine(
         1 => all,
         traces => format!("{} with {all}", count(traces, "trace")),
     };
+    let is_config =
+        |preset: &Preset| preset.machine().is_some() && preset.changed_in(config).is_empty();
+    let name = Preset::all()
+        .find(is_config)
+        .map(|preset| format!("{}, ", preset.name()));
     format!(
-        "{MACHINE}{}; {}-byte lines, {}, {} mode; {of}.",
+        "{MACHINE}{}{}; {}-byte lines, {}, {} mode; {of}.",
+        name.unwrap_or_default(),
         caches,
         config.line_bytes,
         count(config.cores as usize, "core"),

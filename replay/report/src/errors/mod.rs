@@ -4,7 +4,7 @@
 use super::columns::{Column, Columns, columns_of};
 use super::html::Section;
 use super::lists::unique;
-use super::table::Table;
+use super::table::{Style, Table};
 use maud::html;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -105,9 +105,12 @@ pub fn table(of: Of) -> Table {
 }
 
 /// The table with its heading, for a terminal; empty if nothing was measured.
-pub fn text(of: Of) -> String {
+pub fn text(of: Of, style: Style) -> String {
     source(of).map_or_else(String::new, |source| {
-        format!("\nError of the figures ({source})\n{}", table(of).text())
+        format!(
+            "\nError of the figures ({source})\n{}",
+            table(of).styled(style)
+        )
     })
 }
 

@@ -6,7 +6,7 @@ mod plots;
 
 use super::answers;
 use super::document::Document;
-use super::table::Table;
+use super::table::{Style, Table};
 use columns::{CurvePoint, Reuses, Subject, Summary, Window};
 use serde::Serialize;
 use sim::config::{LevelConfig, Mode, RunConfig};
@@ -93,11 +93,11 @@ impl LocalityReport {
     }
 
     /// Columns of the summary as text; the trace only if there are several.
-    fn table(&self, keys: &[&'static str]) -> String {
+    fn table(&self, keys: &[&'static str], style: Style) -> String {
         let one = self.traces.len() == 1;
         let keys = keys.iter().copied();
         let keys = keys.filter(|key| !(one && *key == "trace"));
-        self.rows().picked(keys).text()
+        self.rows().picked(keys).styled(style)
     }
 
     /// A row a trace, stream and order.
@@ -233,12 +233,12 @@ impl Document for LocalityReport {
         out
     }
 
-    fn text(&self) -> String {
-        self.table(&columns::TERMINAL)
+    fn text(&self, style: Style) -> String {
+        self.table(&columns::TERMINAL, style)
     }
 
-    fn details(&self) -> String {
-        self.table(&columns::short())
+    fn details(&self, style: Style) -> String {
+        self.table(&columns::short(), style)
     }
 
     fn csv_files(&self) -> Vec<String> {

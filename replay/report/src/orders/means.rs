@@ -13,8 +13,8 @@ pub struct Mean<'a> {
     pub between: BetweenFrames,
     /// All rows of the order.
     pub rows: Vec<&'a OrderRow<'a>>,
-    /// Morton's change over the same rows, percent.
-    morton_pct: Option<f64>,
+    /// Morton's rows, if it was replayed.
+    morton: Vec<&'a OrderRow<'a>>,
 }
 
 /// Geometric mean; none without values, or if a value is not positive.
@@ -70,25 +70,69 @@ impl<'a> Mean<'a> {
         Some(Figure::bounded(value, means, first.over.clone()))
     }
 
-    /// Change of the bytes relative to Morton order, percent; none if it was not replayed.
-    pub fn over_morton_pct(&self) -> Option<f64> {
-        let ratio = |pct: f64| 1.0 + pct / 100.0;
-        Some(change_pct(
-            ratio(self.change_pct()?) / ratio(self.morton_pct?),
-        ))
+    /// The open rows, each with Morton's of the same trace and caches.
+    fn beside_morton(&self) -> impl Iterator<Item = [&'a OrderRow<'a>; 2]> + '_ {
+        let same = |a: &OrderRow<'_>, b: &OrderRow<'_>| {
+            let sizes = |row: &OrderRow<'_>| {
+                let level = &row.config.level;
+                [level.l1.size_bytes, level.l2.size_bytes]
+            };
+            std::ptr::eq(a.subject, b.subject) && sizes(a) == sizes(b)
+        };
+        let twin = move |row| self.morton.iter().find(|morton| same(row, morton));
+        self.open().filter_map(move |row| Some([row, *twin(row)?]))
     }
 
-    /// Least and most change: over the corners of the machine's ranges, or else over the rows.
+    /// Change of the bytes relative to Morton order, percent, with ends as those of [`Self::change`]; none if it was
+    /// not replayed.
+    pub fn over_morton(&self) -> Option<Figure> {
+        let ratio = |[own, morton]: [f64; 2]| own / morton;
+        let of_rows =
+            |[own, morton]: [&OrderRow<'_>; 2]| Some([own.ratio()?, morton.ratio()?]).map(ratio);
+        let value = geometric(self.beside_morton().filter_map(of_rows)).map(change_pct)?;
+        let corners = self.beside_morton().map(|rows| {
+            let [own, morton] = rows.map(|row| row.corners.as_ref());
+            Some([own?, morton?])
+        });
+        let corners: Vec<_> = corners.collect::<Option<_>>().unwrap_or_default();
+        let Some([first, _]) = corners.first() else {
+            return Some(Figure::exact(value));
+        };
+        let at = |index: usize| {
+            let ratios = corners.iter().map(|[own, morton]| {
+                ratio([own, morton].map(|of| of.bytes[index][0].max(1) as f64))
+            });
+            geometric(ratios).map(change_pct)
+        };
+        let means = (0..first.bytes.len()).filter_map(at);
+        Some(Figure::bounded(value, means, first.over.clone()))
+    }
+
+    /// Least and most change: over the corners of the machine's ranges, or else over the rows. Against Morton if it
+    /// was replayed, else against the baseline.
     pub fn range_pct(&self) -> Option<[f64; 2]> {
-        let change = self.change()?;
+        let over_morton = self.over_morton();
+        let against_morton = over_morton.is_some();
+        let change = over_morton.or_else(|| self.change())?;
         if !matches!(change.because, Because::Exact) {
             return Some([change.low, change.high]);
         }
-        let changes = || self.open().filter_map(OrderRow::ratio).map(change_pct);
+        let ratios: Vec<f64> = match against_morton {
+            true => (self.beside_morton())
+                .filter_map(|[own, morton]| Some(own.ratio()? / morton.ratio()?))
+                .collect(),
+            false => self.open().filter_map(OrderRow::ratio).collect(),
+        };
+        let changes = || ratios.iter().copied().map(change_pct);
         Some([
             changes().min_by(f64::total_cmp)?,
             changes().max_by(f64::total_cmp)?,
         ])
+    }
+
+    /// Whether it was replayed over the ranges of a machine.
+    pub fn has_corners(&self) -> bool {
+        self.rows.iter().any(|row| row.corners.is_some())
     }
 
     /// Change of the cycles relative to the baseline, percent.
@@ -158,23 +202,15 @@ pub fn means<'a>(rows: &'a [OrderRow<'a>]) -> Vec<Mean<'a>> {
             None => means.push(Mean {
                 between,
                 rows: vec![row],
-                morton_pct: None,
+                morton: Vec::new(),
             }),
         }
     }
-    let morton = |between| {
-        let mut orders = means.iter().filter(|of: &&Mean<'_>| of.between == between);
-        orders
-            .find(|of| of.name() == Order::MORTON.name())?
-            .change_pct()
-    };
-    let mortons: Vec<_> = betweens
-        .iter()
-        .map(|between| (*between, morton(*between)))
-        .collect();
+    let is_morton = |of: &&Mean<'_>| of.name() == Order::MORTON.name();
+    let mortons: Vec<Mean<'a>> = means.iter().filter(is_morton).cloned().collect();
     for mean in &mut means {
-        let own = mortons.iter().find(|(between, _)| *between == mean.between);
-        mean.morton_pct = own.and_then(|(_, pct)| *pct);
+        let own = mortons.iter().find(|of| of.between == mean.between);
+        mean.morton = own.map_or_else(Vec::new, |of| of.rows.clone());
     }
     let place = |of: &Mean<'_>| betweens.iter().position(|between| *between == of.between);
     means.sort_by(|a, b| {

@@ -7,7 +7,7 @@ mod page;
 use super::answers;
 use super::document::Document;
 use super::lists::unique;
-use super::table::Table;
+use super::table::{Style, Table};
 use columns::LearnedRow;
 pub use columns::LearnedTrace;
 pub use means::Mean;
@@ -117,7 +117,7 @@ impl Document for OrdersReport<'_> {
     }
 
     /// The means.
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
         let treatments = unique(self.rows.iter().map(|row| row.config.between_frames)).len();
         let table = means.picked(
@@ -125,17 +125,17 @@ impl Document for OrdersReport<'_> {
                 .into_iter()
                 .skip(usize::from(treatments < 2)),
         );
-        let mut text = table.without_empty_columns().text();
+        let mut text = table.without_empty_columns().styled(style);
         if !self.learned.is_empty() {
-            text += &format!("\n{}", self.learned_table().text());
+            text += &format!("\n{}", self.learned_table().styled(style));
         }
         text
     }
 
-    fn details(&self) -> String {
+    fn details(&self, style: Style) -> String {
         let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
         let names = ["between_frames", "order", "buildable"].into_iter();
         let table = means.picked(names.chain(columns::CHANGES).chain(columns::SIZES));
-        table.without_empty_columns().text()
+        table.without_empty_columns().styled(style)
     }
 }

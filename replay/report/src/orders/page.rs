@@ -3,7 +3,7 @@
 use super::{Mean, OrdersReport, columns, means};
 use crate::answers;
 use crate::document::Document;
-use crate::html::{self, Answer, Page};
+use crate::html::{self, Answer, Page, count};
 use crate::lists::unique;
 use crate::plots::PlotError;
 use crate::plots::SeriesStyle;
@@ -112,15 +112,20 @@ pub(super) fn sentences(means: &[Mean<'_>]) -> Vec<String> {
         change_pct: mean.change_pct().unwrap_or(0.0),
         is_buildable: is_buildable(mean),
         range_pct: mean.range_pct(),
-        over_morton_pct: mean.over_morton_pct(),
+        over_morton_pct: mean.over_morton().map(|of| of.value),
         state_bytes: mean.cost().map_or(0, |cost| cost.state_bytes.into()),
     });
     let rows = first_of(means).map(|mean| mean.rows.len()).max();
-    answers::studied(
-        BASELINE.name(),
-        &orders.collect::<Vec<_>>(),
-        rows.unwrap_or(0),
-    )
+    let has_ranges = first_of(means).any(Mean::has_corners);
+    let over = match (rows.unwrap_or(0), has_ranges) {
+        (1, true) => "over the values that are not published".to_owned(),
+        (rows, true) => format!(
+            "mean over {}, over the values that are not published",
+            count(rows, "trace")
+        ),
+        (rows, false) => format!("mean over {} of trace and caches", count(rows, "pair")),
+    };
+    answers::studied(BASELINE.name(), &orders.collect::<Vec<_>>(), &over)
 }
 
 /// Bytes of every order and bound relative to the baseline.

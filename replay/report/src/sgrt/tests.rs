@@ -1,4 +1,5 @@
 use super::*;
+use crate::table::Style;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::loaded::LoadedTrace;
@@ -120,7 +121,7 @@ fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
         ..View::default()
     });
     let needle = "the paper's row test does not apply";
-    assert!(details(std::slice::from_ref(&canted)).contains(needle));
+    assert!(details(std::slice::from_ref(&canted), Style::Terminal).contains(needle));
     let html = page(std::slice::from_ref(&canted)).expect("a page");
     assert!(html.contains("row test does not apply"));
     let json = serde_json::to_value(&canted.report).expect("json");
@@ -134,7 +135,7 @@ fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
             .ends_with("false")
     );
 
-    assert!(!details(&[entry()]).contains(needle));
+    assert!(!details(&[entry()], Style::Terminal).contains(needle));
 }
 
 #[test]
@@ -142,7 +143,7 @@ fn the_terminal_tables_name_scene_and_rule() {
     let entries = vec![entry()];
     let report = ReprojectReport { entries };
     for with_details in [false, true] {
-        let text = report.terminal(with_details);
+        let text = report.terminal(Style::Terminal, with_details);
         assert!(
             text.contains("teapot") && text.contains(sgrt::DEFAULT_RULE),
             "{text}"

@@ -10,7 +10,7 @@ pub use page::Scene;
 
 use super::columns::{Columns, columns_of};
 use super::document::Document;
-use super::table::Table;
+use super::table::{Style, Table};
 use columns::{columns, order_columns};
 use formats::view::Lens;
 use published::{claim_columns, claims};
@@ -158,7 +158,7 @@ impl<'r> Document for TechniquesReport<'r> {
     }
 
     /// Time with its quartiles, error and traffic of each technique.
-    fn text(&self) -> String {
+    fn text(&self, style: Style) -> String {
         let one = self.scenes.len() == 1;
         let rows = self.measured();
         let mut columns = columns_of::<&Measured>()
@@ -178,18 +178,18 @@ impl<'r> Document for TechniquesReport<'r> {
         for (row, cells) in table.rows.iter_mut().zip(traffic.rows) {
             row.extend(cells);
         }
-        table.grouped_by(usize::from(!one)).text()
+        table.grouped_by(usize::from(!one)).styled(style)
     }
 
     /// All columns, pacing, orders, and notes about the driver.
-    fn details(&self) -> String {
-        let mut text = self.short_table().text();
+    fn details(&self, style: Style) -> String {
+        let mut text = self.short_table().styled(style);
         text += "\n";
-        text += &self.pacing_table().text();
+        text += &self.pacing_table().styled(style);
         let orders = self.order_table();
         if !orders.rows.is_empty() {
             text += "\n";
-            text += &orders.text();
+            text += &orders.styled(style);
         }
         let software = self.manifests.iter().find(|m| m.software_driver);
         if let Some(manifest) = software {

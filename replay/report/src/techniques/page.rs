@@ -4,7 +4,7 @@ use super::frusta::Frusta;
 use super::{TechniquesReport, plots};
 use crate::answers;
 use crate::document::Document;
-use crate::html::{self, Answer, Page};
+use crate::html::{self, Answer, Page, count};
 use crate::picture::EmbeddedPicture;
 use crate::plots::PlotError;
 use crate::table::Table;
@@ -186,11 +186,16 @@ impl TechniquesReport<'_> {
                 (baseline, noise),
             )
         });
-        if self.manifests.iter().any(|m| m.software_driver) {
-            out.push(
-                "The driver renders in software, so frame times are a processor's, not a GPU's."
-                    .to_owned(),
-            );
+        if let (Some(manifest), false) = (self.manifests.first(), out.is_empty()) {
+            let [width, height] = manifest.size_px;
+            let frames = count(manifest.frames.len(), "frame");
+            let software = match self.manifests.iter().any(|m| m.software_driver) {
+                true => ", by a software driver: frame times are a processor's, not a GPU's",
+                false => "",
+            };
+            let condition =
+                format!("Measured at {width}x{height} pixels per eye over {frames}{software}.");
+            out.insert(1, condition);
         }
         let defects = self
             .manifests

@@ -5,7 +5,7 @@ use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::figures::number;
 use crate::lists::{mean, unique};
-use crate::table::Table;
+use crate::table::{Style, Table};
 use crate::z2::{page, tables};
 use formats::textrace::TraceMeta;
 use serde::Serialize;
@@ -281,12 +281,12 @@ impl Document for PaperReport<'_> {
         page::sentences(self)
     }
 
-    fn text(&self) -> String {
-        tables::text(self)
+    fn text(&self, style: Style) -> String {
+        tables::text(self, style)
     }
 
-    fn details(&self) -> String {
-        tables::details(self)
+    fn details(&self, style: Style) -> String {
+        tables::details(self, style)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::model::{Average, PaperReport};
 use crate::columns::{Column, Row, pick};
 use crate::errors::{self, Of};
-use crate::table::Table;
+use crate::table::{Style, Table};
 use sim::result::Part;
 use std::fmt::Write as _;
 use studies::experiment::ResultRow;
@@ -154,21 +154,21 @@ const TERMINAL: [&str; 8] = [
 ];
 
 /// The main columns of Table 2, and the comparison of modes if it was asked for.
-pub(super) fn text(report: &PaperReport) -> String {
+pub(super) fn text(report: &PaperReport, style: Style) -> String {
     let table = table_2(report).picked(TERMINAL).grouped_by(2);
-    let modes = modes(report).map(|table| format!("\n{}", table.text()));
-    table.text() + &modes.unwrap_or_default()
+    let modes = modes(report).map(|table| format!("\n{}", table.styled(style)));
+    table.styled(style) + &modes.unwrap_or_default()
 }
 
 /// All columns of Table 2, means, counts as in the paper, and known errors.
-pub(super) fn details(report: &PaperReport) -> String {
-    let mut text = table_2(report).text();
-    let _ = write!(text, "\n{}", averages(&report.averages).text());
+pub(super) fn details(report: &PaperReport, style: Style) -> String {
+    let mut text = table_2(report).styled(style);
+    let _ = write!(text, "\n{}", averages(&report.averages).styled(style));
     if let Some(table) = as_the_paper_counts(report) {
         let _ = write!(
             text,
             "\nCounted as in the paper (--preset z2-paper): first look-ups, with merged requests; memory traffic is in the columns on the right\n{}",
-            table.text()
+            table.styled(style)
         );
     }
     let fit = &report.closed_form;
@@ -179,7 +179,7 @@ pub(super) fn details(report: &PaperReport) -> String {
             fit.mean_absolute_points, fit.largest_points, fit.rows
         );
     }
-    text += &errors::text(Of::Textures);
+    text += &errors::text(Of::Textures, style);
     for c in report
         .conservation
         .iter()

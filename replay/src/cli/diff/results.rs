@@ -74,6 +74,14 @@ pub(super) fn run(args: &DiffArgs) -> Result<ExitCode> {
         "{count} of {} figures differ by more than {threshold} %.\n",
         figures.len()
     );
+    for (path, keys) in [&args.left, &args.right]
+        .into_iter()
+        .zip(only_in_one(&results))
+    {
+        if !keys.is_empty() {
+            text += &format!("Only in {}: {}\n", path.display(), keys.join(", "));
+        }
+    }
     for (key, [left, right]) in settings(&results) {
         text += &format!("{key}: {left} and {right}\n");
     }
@@ -143,6 +151,15 @@ fn both(results: &[Value; 2], member: &str) -> [BTreeMap<String, Value>; 2] {
     })
 }
 
+/// Figures that only one result has, by result.
+fn only_in_one(results: &[Value; 2]) -> [Vec<String>; 2] {
+    let sides = both(results, "result");
+    [0, 1].map(|side: usize| {
+        let is_alone = |key: &&String| !sides[1 - side].contains_key(*key);
+        sides[side].keys().filter(is_alone).cloned().collect()
+    })
+}
+
 /// Numbers that both results have.
 fn figures(results: &[Value; 2]) -> Vec<Figure> {
     let [left, right] = both(results, "result");
@@ -183,6 +200,12 @@ mod tests {
         let results = [result("morton", 100, 0), result("z2-sta", 60, 5)];
         let found = figures(&results);
         assert_eq!(found.len(), 2);
+        let mut unlike = results.clone();
+        unlike[1]["result"] = json!({"external_bytes": 60, "tmu": {"loops": 1}});
+        assert_eq!(
+            only_in_one(&unlike),
+            [vec!["cycles".to_owned()], vec!["tmu.loops".to_owned()]]
+        );
         let bytes = &found[1];
         assert_eq!(bytes.key, "external_bytes");
         assert!((bytes.change_pct() + 40.0).abs() < 1e-9);

@@ -37,6 +37,8 @@ pub struct Corners {
     pub configs: Vec<RunConfig>,
     /// The ranges in words.
     pub over: String,
+    /// Replays there only the baseline, Morton and this many of the best orders; `None`: all orders.
+    pub finalists: Option<usize>,
 }
 
 /// Reasons why a study fails.
@@ -164,7 +166,39 @@ impl OrdersStudy {
         }
     }
 
-    /// Replays every order at the corners of the machine's ranges, and adds the bytes to the rows.
+    /// Number of replays of each trace.
+    pub fn replays_per_trace(&self) -> usize {
+        let corners = self.corners.as_ref().map_or(0, |corners| {
+            let finalists = corners.finalists.map_or(usize::MAX, |best| best + 2);
+            corners.configs.len() * self.orders.len().min(finalists)
+        });
+        self.between.len() * (self.caches_bytes.len() * self.orders.len() + corners)
+    }
+
+    /// The baseline, Morton, and the buildable orders with the fewest bytes over all traces and caches.
+    fn finalists(&self, of_traces: &[Vec<OrderRow<'_>>], best: usize) -> Vec<Order> {
+        let score = |order: Order| {
+            let rows = of_traces.iter().flatten();
+            let own = rows.filter(|row| row.config.order == order && row.is_buildable());
+            let bytes: Vec<f64> = own
+                .map(|row| (row.external_bytes.max(1) as f64).ln())
+                .collect();
+            (!bytes.is_empty()).then(|| bytes.iter().sum::<f64>())
+        };
+        let mut ranked: Vec<(f64, Order)> = (self.orders.iter())
+            .filter(|order| ![BASELINE, Order::MORTON].contains(order))
+            .filter_map(|&order| Some((score(order)?, order)))
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = ranked.into_iter().take(best).map(|(_, order)| order);
+        let fixed = [BASELINE, Order::MORTON].into_iter();
+        fixed
+            .filter(|order| self.orders.contains(order))
+            .chain(best)
+            .collect()
+    }
+
+    /// Replays orders at the corners of the machine's ranges, and adds the bytes to their rows.
     fn add_corners(
         &self,
         corners: &Corners,
@@ -172,6 +206,10 @@ impl OrdersStudy {
         of_traces: &mut [Vec<OrderRow<'_>>],
         done: &(dyn Fn(u64) + Sync),
     ) -> Result<Work, OrdersError> {
+        let orders = match corners.finalists {
+            Some(best) => self.finalists(of_traces, best),
+            None => self.orders.clone(),
+        };
         let settings = self.between.iter().flat_map(|&between_frames| {
             (corners.configs.iter()).map(move |config| RunConfig {
                 between_frames,
@@ -179,7 +217,7 @@ impl OrdersStudy {
             })
         });
         let points = settings.flat_map(|config| {
-            (self.orders.iter()).map(move |&order| Point {
+            orders.iter().map(move |&order| Point {
                 settings: Vec::new(),
                 change: None,
                 config: RunConfig { order, ..config },
@@ -199,7 +237,10 @@ impl OrdersStudy {
             let results: Vec<_> = (of_trace.iter())
                 .map(|row| (&row.point.config, row.result.external_bytes))
                 .collect();
-            for row in rows {
+            let finalists = rows
+                .iter_mut()
+                .filter(|row| orders.contains(&row.config.order));
+            for row in finalists {
                 let between = row.config.between_frames;
                 let of = |order: Order| {
                     let own = results.iter().filter(move |(config, _)| {
@@ -480,6 +521,7 @@ mod tests {
             corners: Some(Corners {
                 configs: configs.clone(),
                 over: "two corners".to_owned(),
+                finalists: None,
             }),
             caches_bytes: vec![(1 << 10, 8 << 10)],
             between: vec![BetweenFrames::Keep],
