@@ -106,6 +106,28 @@ fn the_constants_are_those_of_the_results() {
 }
 
 #[test]
+fn the_drawings_are_those_of_the_documents() {
+    if !parallax_tests::has_lavapipe() {
+        return;
+    }
+    let out = tempfile::tempdir().expect("a folder");
+    let folder = out.path().to_str().expect("a path in UTF-8");
+    let Some(output) = studies(&["drawings", "--results", folder]) else {
+        return;
+    };
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut drawings = 0;
+    for entry in fs::read_dir(out.path()).expect("a folder") {
+        let made = entry.expect("an entry").path();
+        let name = made.file_name().expect("a name");
+        let kept = fs::read(root().join("docs/images").join(name)).expect("a drawing");
+        assert!(fs::read(&made).expect("a drawing") == kept, "{name:?}");
+        drawings += 1;
+    }
+    assert_eq!(drawings, 5);
+}
+
+#[test]
 fn an_unknown_study_and_an_absent_scene_are_named() {
     let Some(output) = studies(&["oders"]) else {
         return;
