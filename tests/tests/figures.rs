@@ -1,7 +1,7 @@
 //! Checks that the figures in documents are those of the results files in `results/`. `make figures`
 //! rewrites the tables.
 
-use parallax_tests::figures::{Results, documents, typed_tables, with_tables};
+use parallax_tests::figures::{Results, documents, typed_tables, with_inline_figures, with_tables};
 use parallax_tests::root;
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,13 +9,16 @@ use std::fs;
 #[test]
 fn every_marked_table_equals_its_results_file() {
     let writes = std::env::var_os("UPDATE_FIGURES").is_some();
-    let mut shown = BTreeSet::new();
+    let (mut shown, mut inline_figures) = (BTreeSet::new(), 0);
     for file in documents() {
         let name = file.display();
         let text = fs::read_to_string(&file).expect("a document");
         let made = with_tables(&text, &root().join("results"));
         let (made, names) = made.unwrap_or_else(|error| panic!("{name}: {error}"));
         shown.extend(names);
+        let inline = with_inline_figures(&made, &root().join("results"));
+        let (made, marks) = inline.unwrap_or_else(|error| panic!("{name}: {error}"));
+        inline_figures += marks;
         if writes && made != text {
             fs::write(&file, &made).expect("a document");
         } else {
@@ -25,11 +28,43 @@ fn every_marked_table_equals_its_results_file() {
                 .find(|(_, (found, wanted))| found != wanted);
             assert!(
                 made == text,
-                "{name}: a table differs from its results (`make figures` writes it anew): line, found and expected {first:?}"
+                "{name}: a figure differs from its results (`make figures` writes it anew): line, found and expected {first:?}"
             );
         }
     }
     assert!(!shown.is_empty(), "no document has a marked table");
+    assert!(inline_figures > 50, "{inline_figures} figures in sentences");
+}
+
+#[test]
+fn a_figure_in_a_sentence_is_computed_from_its_rows() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = "# command: none\nscene,\"gain, %\"\na,-2.54 [-3.0 to 1.25]\nb,b_1k: 7\nc,-\n";
+    fs::write(folder.path().join("a.csv"), rows).expect("writable");
+    let made = |text: &str| with_inline_figures(text, folder.path()).map(|(text, _)| text);
+    for (typed, formula, figure) in [
+        ("9.9", "one; a; gain, %; scene=a", "2.5"),
+        ("-9", "one; a; gain, %; scene=a", "-3"),
+        ("0.00", "one; a; gain, %@2; scene=a", "1.25"),
+        ("0", "max; a; gain, %; scene=a|b", "7"),
+        ("-0.0", "min; a; gain, %; scene=a|b", "-2.5"),
+    ] {
+        let (text, wanted) = [typed, figure]
+            .map(|number| format!("It saves {number}<!-- = {formula} --> %."))
+            .into();
+        assert_eq!(made(&text), Ok(wanted));
+    }
+    for (formula, error) in [
+        ("one; a; gain, %; scene=a|b", "expected one row, found 2"),
+        ("max; a; gain, %; scene=d", "no row"),
+        ("max; a; gain, %; scene=c", "no number in '-'"),
+        ("max; a; loss; scene=a", "no column 'loss'"),
+        ("max; a; gain, %; place=a", "no column 'place'"),
+        ("mean; a; gain, %; scene=a", "expected min, max or one"),
+    ] {
+        let found = made(&format!("1<!-- = {formula} -->")).expect_err(formula);
+        assert!(found.contains(error), "{found}");
+    }
 }
 
 #[test]

@@ -2,15 +2,18 @@
 //!
 //! A results file is `results/NAME.csv`: comment lines starting with `# command:` name the commands that
 //! made it; a header and rows follow. A table in a document is between `<!-- figures: NAME -->` and
-//! `<!-- end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`].
+//! `<!-- end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`]. Figures
+//! within sentences have marks of their own ([`with_inline_figures`]).
 
 mod applications;
+mod inline;
 mod paper_comparison;
 mod reprojection;
 mod scene_files;
 mod shards;
 mod view;
 
+pub use inline::with_inline_figures;
 pub use view::{Results, Row, markdown};
 
 use std::path::{Path, PathBuf};
