@@ -327,7 +327,7 @@ fn texels_note(textures: &TextureSet, searched: Duration) -> String {
         .collect();
     let formats: Vec<String> = formats.into_iter().collect();
     format!(
-        "{:.1} MiB of texels in {}, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        "{:.1} MiB of texels in {}; {:.1} MiB that no view samples skipped: {} images, and the finest levels of {} others (found in {:.2} s)",
         mib(textures.bytes()),
         formats.join(", "),
         mib(textures.skipped_bytes()),
