@@ -53,7 +53,7 @@ ORDERS = {
 def work_items(study, trace, order):
     """The tiles of each work item of one core, (eye, column, row), in the order of the replay's time line."""
     timeline = study.work / "timeline.json"
-    study.replay("run --cores 1 --quiet --order", order, trace, "--timeline", timeline)
+    study.replay("run --cores 1 --tile-px 16 --quiet --order", order, trace, "--timeline", timeline)
     events = [event for event in json.loads(timeline.read_text())["traceEvents"] if "start_cycle" in event.get("args", {})]
     for event in sorted(events, key=lambda event: event["args"]["start_cycle"]):
         yield [(eye, int(column), int(row)) for eye, column, row in re.findall(r"(left|right) (\d+),(\d+)", event["name"])]
