@@ -1,4 +1,4 @@
-"""README.md's picture and table, from one built-in scene. Needs Pillow (Debian: python3-pil). The same Mesa gives the same figures."""
+"""README.md's picture, and a table of docs/results/z2-comparison.md, from one built-in scene. Needs Pillow (Debian: python3-pil). The same Mesa gives the same figures."""
 
 import base64
 import io

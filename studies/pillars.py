@@ -23,23 +23,20 @@ def run(study):
     rows = []
 
     def add(what, saves, error, measured, page):
-        rows.append([what, saves, error, measured, f"[{page.split('/')[-1]}](docs/results/{page}.md)"])
+        rows.append([f"[{what}](docs/results/{page}.md)", saves, error, measured])
 
     paper = table("paper-means")
-    add("Tile order Z2 STA", f"{ends(row['STA saved %'].split()[0] for row in paper)} of texture bytes against Morton", "none",
-        f"{len(paper)} scenes and layouts of shadow maps, the Z2 paper's machine", "z2-comparison")
+    add("Z2 STA", f"{ends(row['STA saved %'].split()[0] for row in paper)} of texture bytes", "none", f"{len(paper)} cases", "z2-comparison")
     quest = next(row for row in table("sizes-machines") if row["machine"] == "adreno-740" and row["display"] == "quest3")
     low, high = quest["zig-zag+sta+offset %"].split("[")[1].rstrip("]").split(" to ")
-    add("Tile order zig-zag+sta+offset", f"{ends((-float(high), -float(low)))} of texture bytes against Z2 STA", "none",
-        f"{quest['scenes']} scenes, Adreno 740, Quest 3", "sizes")
+    add("zig-zag+sta+offset", f"{ends((-float(high), -float(low)))} of texture bytes", "none", f"{quest['scenes']} scenes", "sizes")
     for name, key, what in ((MASK, "fragments", "fragments"), (MULTIVIEW, "draws", "draw calls"), (RINGS, "fragments", "fragments")):
         saved, flip = techniques(study, name, key)
-        add(f"Technique {name}", f"{saved} of {what}", f"FLIP {flip}" if float(flip.split()[-1]) else "none", f"{len(SCENES)} built-in scenes, 10 pixels per degree", "techniques")
+        add(name, f"{saved} of {what}", flip if float(flip.split()[-1]) else "none", f"{len(SCENES)} scenes", "techniques")
     reuse = [row for row in table("reprojection") if row["run"] == "chosen"]
-    add("Reprojection of ray hits", f"{ends((100 * (float(row['relative_performance']) - 1) for row in reuse))} more frames per second, "
-        f"{ends((100 * (float(row['relative_energy']) - 1) for row in reuse))} more energy", f"FLIP {ends((row['flip_mean'] for row in reuse), '', 4)}",
-        f"{len(reuse)} scenes, the SGRT paper's machine", "reprojection")
+    for key, what in (("performance", "frames/s"), ("energy", "energy")):
+        add("reprojection", f"{ends(100 * (float(row[f'relative_{key}']) - 1) for row in reuse)} more {what}",
+            ends((row["flip_mean"] for row in reuse), "", 4), f"{len(reuse)} scenes", "reprojection")
     programs = [row for row in table("applications") if row["Z2 STA saves %"] not in ("", "-")]
-    add("Z2 STA in unmodified programs", f"{ends(row['Z2 STA saves %'] for row in programs)} of texture bytes against Morton", "none",
-        f"{len(programs)} programs and pages", "applications")
-    study.write("pillars", "from paper-means, sizes-machines, techniques-*, reprojection and applications", "what | saves, lowest to highest | image error | measured on | page", rows)
+    add("Z2 STA, programs", f"{ends(row['Z2 STA saves %'] for row in programs)} of texture bytes", "none", f"{len(programs)} programs", "applications")
+    study.write("pillars", "from paper-means, sizes-machines, techniques-*, reprojection and applications", "what | saves, lowest to highest | FLIP error | measured on", rows)
