@@ -136,6 +136,7 @@ pub(super) fn volumes(_: &CullInput<'_>) -> Result<Volumes, TooWide> {
     ], "tracegen raster teapot --hmd example -o {out}"),
     ("built-in scene", 2, {"tracegen/scenes/data/example.scene": "mesh floor here\n"}, [
         row("tracegen/scenes/src/lib.rs", r"^pub const BUILTINS", '    builtin("example", 2, &["default"], "a square", include_str!("../data/example.scene"), Code::NONE),'),
+        row("tracegen/scenes/src/texture_synth.rs", r"^const SOURCE_TEXT", '    include_str!("../data/example.scene"),'),
     ], "tracegen raster example --size 64x64 -o {out}"),
     ("stress sweep", 2, {}, [
         row("lab/src/stress/sweeps/mod.rs", r"^pub const SWEEPS", '    sweep("example", "An example.", [1.0, 1.0], None, textures::sizes),'),
