@@ -86,8 +86,14 @@ pub fn machine(
         1 => all,
         traces => format!("{} with {all}", count(traces, "trace")),
     };
-    let is_config =
-        |preset: &Preset| preset.machine().is_some() && preset.changed_in(config).is_empty();
+    // DRAM changes none of the figures that stand beside this sentence.
+    let without_dram = |config: RunConfig| RunConfig {
+        dram: None,
+        ..config
+    };
+    let is_config = |preset: &Preset| {
+        preset.machine().is_some() && without_dram(preset.over(*config)) == without_dram(*config)
+    };
     let name = Preset::all()
         .find(is_config)
         .map(|preset| format!("{}, ", preset.name()));

@@ -181,7 +181,7 @@ impl<'a> Group<'a> {
             return None;
         }
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
-        let sets = l1.map(|(sets, ways)| (ways >= 4).then_some(sets));
+        let sets = l1.map(|l1| (l1.ways >= 4).then_some(l1.sets));
         sets.min().flatten()
     }
 

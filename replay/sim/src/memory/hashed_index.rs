@@ -20,17 +20,22 @@ impl HashedIndex {
     }
 
     fn hashed(&self, line: u32) -> u32 {
-        if self.set_bits == 0 || line == EMPTY {
-            return line;
-        }
-        let (mut hashed, mut rest) = (line, line >> self.set_bits);
-        let mask = (1 << self.set_bits) - 1;
-        while rest != 0 {
-            hashed ^= rest & mask;
-            rest >>= self.set_bits;
-        }
-        hashed
+        hashed(line, self.set_bits)
     }
+}
+
+/// The hashed number of a line in a cache of 2^`set_bits` sets.
+pub(crate) fn hashed(line: u32, set_bits: u32) -> u32 {
+    if set_bits == 0 || line == EMPTY {
+        return line;
+    }
+    let (mut hashed, mut rest) = (line, line >> set_bits);
+    let mask = (1 << set_bits) - 1;
+    while rest != 0 {
+        hashed ^= rest & mask;
+        rest >>= set_bits;
+    }
+    hashed
 }
 
 impl Cache for HashedIndex {

@@ -34,6 +34,7 @@ pub use access::{Access, Client};
 pub use cache::Cache;
 pub use calendar::Calendar;
 pub use fast::Forest;
+pub(crate) use hashed_index::hashed;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};
 pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
 pub use policy::{AnyCache, AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};

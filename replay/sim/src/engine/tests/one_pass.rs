@@ -1,12 +1,13 @@
 //! Compares the single pass over many LRU configurations with separate replays and with plain lists.
 
 use super::*;
-use crate::config::Replacement;
+use crate::config::{Replacement, SetIndex};
 
 /// LRU sets as plain lists, most recently used last.
 pub(super) struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
+    set_index: SetIndex,
 }
 
 impl Twin {
@@ -14,11 +15,18 @@ impl Twin {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
+            set_index: config.set_index,
         }
     }
 
     pub(super) fn access(&mut self, line: u32) -> bool {
-        let index = line as usize % self.sets.len();
+        let sets = self.sets.len();
+        let digit = |line: usize| (line % sets, line / sets);
+        let (mut index, mut rest) = digit(line as usize);
+        while self.set_index == SetIndex::Xor && rest > 0 && sets > 1 {
+            let (next, above) = digit(rest);
+            (index, rest) = (index ^ next, above);
+        }
         let set = &mut self.sets[index];
         let hit = set.contains(&line);
         set.retain(|&l| l != line);
@@ -84,7 +92,10 @@ fn a_thousand_sets_of_configurations_have_the_counts_of_separate_replays() {
             .map(|_| RunConfig {
                 level: Levels::two(
                     random_cache(&mut random, 32),
-                    random_cache(&mut random, 256),
+                    LevelConfig {
+                        set_index: random.pick(&SetIndex::ALL),
+                        ..random_cache(&mut random, 256)
+                    },
                 ),
                 tile_maps: random.below(3) == 0,
                 ..base

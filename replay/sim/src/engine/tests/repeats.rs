@@ -133,6 +133,7 @@ fn treatments_between_frames_and_equal_frames_have_the_counts_of_plain_replays()
         let levels: Vec<Levels> = (0..=random.below(2))
             .map(|_| {
                 let mut l2 = random_cache(&mut random, 256);
+                l2.set_index = random.pick(&crate::config::SetIndex::ALL);
                 l2.ways = 4;
                 l2.size_bytes = l2.size_bytes.next_power_of_two().max(1 << 10);
                 Levels::two(random_cache(&mut random, 32), l2)

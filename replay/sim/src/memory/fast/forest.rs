@@ -57,15 +57,14 @@ fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
 /// LRU caches with several numbers of sets and ways, accessed by the same lines.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Forest {
-    /// By number of sets, ascending.
     trees: Vec<Stacks>,
 }
 
 impl Forest {
-    /// Empty caches. `trees` lists at least one number of sets (powers of two, ascending), each
-    /// with its largest associativity (at most 255).
+    /// Empty caches. `trees` lists at least one number of sets (powers of two), each with its largest associativity
+    /// (at most 255). Only [`Self::access_tree`] allows numbers of sets that do not ascend.
     pub fn new(trees: &[(u32, u32)]) -> Self {
-        debug_assert!(!trees.is_empty() && trees.is_sorted_by(|a, b| a.0 < b.0));
+        debug_assert!(!trees.is_empty());
         let stacks = |&(sets, ways): &(u32, u32)| Stacks {
             lines: vec![EMPTY; sets as usize * ways as usize],
             set_mask: sets - 1,

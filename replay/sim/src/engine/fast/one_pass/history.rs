@@ -7,7 +7,7 @@
 
 use super::pending::{PendingLines, Under};
 use super::tally::{ByTile, FootprintLine, LevelTallies};
-use super::{LevelGeometry, SetsAndWays};
+use super::{LevelGeometry, Shape};
 use crate::config::{BetweenFrames, RunConfig};
 use crate::engine::counts::{CacheCounts, CellMisses, TileMisses};
 use crate::memory::{Forest, OtherWork};
@@ -48,7 +48,7 @@ impl History {
         let by_tile = |what| tile_maps.then_some(what);
         let l1 = geometries.iter().map(|g| g.0);
         let l1 = LevelTallies::new(bins, by_tile(ByTile::Footprints), l1);
-        let mut distinct: Vec<SetsAndWays> = geometries.iter().map(|g| g.0).collect();
+        let mut distinct: Vec<Shape> = geometries.iter().map(|g| g.0).collect();
         distinct.sort_unstable();
         distinct.dedup();
         let under = distinct.iter().map(|&of| {
@@ -57,7 +57,7 @@ impl History {
             let (tree, rank) = l1.find(of);
             Under {
                 tree,
-                ways: of.1 as u8,
+                ways: of.ways as u8,
                 rank,
                 forest: level.forest(),
                 level,
@@ -68,7 +68,7 @@ impl History {
             between,
             l1_followed_since: None,
             forests: (0..cores).map(|_| l1.forest()).collect(),
-            least_ways: distinct.iter().map(|g| g.1).min().unwrap_or(0),
+            least_ways: distinct.iter().map(|g| g.ways).min().unwrap_or(0),
             pending: PendingLines::new(l1.tallies.len()),
             under: under.collect(),
             l1,
@@ -286,6 +286,7 @@ impl History {
         for under in &mut self.under {
             for (tree, tally) in under.level.tallies.iter().enumerate() {
                 let lines = other.lines(u64::from(tally.sets) * u64::from(tally.depth()), 0);
+                let lines = lines.map(|line| tally.placed(line));
                 under.forest.access_tree(tree, lines, &mut Vec::new());
             }
         }

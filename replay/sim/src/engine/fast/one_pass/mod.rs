@@ -13,28 +13,44 @@ mod tally;
 
 use self::history::History;
 use self::past::Past;
-use crate::config::{BetweenFrames, LevelConfig, RunConfig};
+use crate::config::{BetweenFrames, LevelConfig, RunConfig, SetIndex};
 use crate::engine::machine::{AtOnce, FrameWork, Machine};
 use crate::engine::outcome::MachineOutcome;
 use crate::stream::{Bins, Consumer, QuadLines, StreamError, Tag, interleave};
 
-/// Sets and ways of a cache.
-pub type SetsAndWays = (u32, u32);
+/// Sets and ways of a cache. Caches with a hashed set index sort before the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Shape {
+    pub(crate) is_modulo: bool,
+    pub(crate) sets: u32,
+    pub(crate) ways: u32,
+}
 
-/// Sets and ways of both levels.
-pub(crate) type LevelGeometry = (SetsAndWays, SetsAndWays);
+/// The shapes of both levels.
+pub(crate) type LevelGeometry = (Shape, Shape);
 
-/// The geometry of a configuration with a shared L2 whose caches are all plain LRU.
+/// The geometry of a configuration with a shared L2 whose caches are all plain LRU, the L2 with any set index.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
     if !config.level.l2.shared {
         return None;
     }
     let of = |cache: &LevelConfig, level| {
-        let lru = cache.is_plain_lru();
         let sets = cache.sets(level, config.line_bytes).ok()?;
-        lru.then_some((sets, cache.ways))
+        cache.is_plain_lru().then_some(Shape {
+            is_modulo: true,
+            sets,
+            ways: cache.ways,
+        })
     };
-    Some((of(&config.level.l1, "L1")?, of(&config.level.l2, "L2")?))
+    let l2 = LevelConfig {
+        set_index: SetIndex::Modulo,
+        ..config.level.l2
+    };
+    let l2 = Shape {
+        is_modulo: config.level.l2.set_index == SetIndex::Modulo,
+        ..of(&l2, "L2")?
+    };
+    Some((of(&config.level.l1, "L1")?, l2))
 }
 
 /// Quads between two comparisons of cache contents.

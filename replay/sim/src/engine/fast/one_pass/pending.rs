@@ -106,10 +106,16 @@ impl PendingLines {
         let last = under.level.tallies.len() - 1;
         for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
             let lines = self.missed.iter().map(|access| access.line);
-            under.forest.access_tree(tree, lines, &mut self.l2_depths);
+            match tally.is_modulo {
+                true => under.forest.access_tree(tree, lines, &mut self.l2_depths),
+                false => {
+                    let lines = lines.map(|line| tally.placed(line));
+                    under.forest.access_tree(tree, lines, &mut self.l2_depths);
+                }
+            }
             let depths = self.l2_depths.iter().copied();
             tally.count(&self.missed, depths.clone());
-            if tree < last {
+            if tree < last && tally.is_modulo {
                 // A line on top with fewer sets is on top with more sets.
                 retain(&mut self.missed, depths, 1);
             }

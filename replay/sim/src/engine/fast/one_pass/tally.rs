@@ -2,9 +2,9 @@
 //!
 //! Accesses are counted in batches and without branches, because whether a line misses is unpredictable.
 
-use super::SetsAndWays;
+use super::Shape;
 use crate::engine::counts::Misses;
-use crate::memory::Forest;
+use crate::memory::{Forest, hashed};
 use crate::stream::Bins;
 use std::hint::select_unpredictable;
 
@@ -71,6 +71,8 @@ impl<T: Copy + Default> Classes<T> {
 #[derive(Clone)]
 pub(super) struct Tally {
     pub(super) sets: u32,
+    /// Whether a line's low bits are its set; else they are hashed.
+    pub(super) is_modulo: bool,
     /// Associativities, ascending.
     ways: Vec<u32>,
     /// Number of associativities that miss a line, by its depth.
@@ -85,6 +87,14 @@ impl Tally {
     /// The largest associativity.
     pub(super) fn depth(&self) -> u32 {
         self.ways.last().copied().unwrap_or(0)
+    }
+
+    /// The number under which its caches hold a line.
+    pub(super) fn placed(&self, line: u32) -> u32 {
+        match self.is_modulo {
+            true => line,
+            false => hashed(line, self.sets.ilog2()),
+        }
     }
 
     /// Counts accesses, footprint by footprint. `depths` has each line's depth in its stack.
@@ -194,18 +204,19 @@ impl LevelTallies {
     pub(super) fn new(
         bins: &Bins,
         by_tile: Option<ByTile>,
-        geometries: impl Iterator<Item = SetsAndWays>,
+        geometries: impl Iterator<Item = Shape>,
     ) -> Self {
-        let mut sorted: Vec<SetsAndWays> = geometries.collect();
+        let mut sorted: Vec<Shape> = geometries.collect();
         sorted.sort_unstable();
         sorted.dedup();
-        let tally = |same_sets: &[SetsAndWays]| {
-            let ways: Vec<u32> = same_sets.iter().map(|&(_, ways)| ways).collect();
+        let tally = |same_sets: &[Shape]| {
+            let ways: Vec<u32> = same_sets.iter().map(|of| of.ways).collect();
             let depth = ways.last().copied().unwrap_or(0);
             let missing = |depth| ways.iter().filter(|&&w| w <= depth).count() as u8;
             let tiles = by_tile.map_or(0, |_| bins.tiles());
             Tally {
-                sets: same_sets[0].0,
+                sets: same_sets[0].sets,
+                is_modulo: same_sets[0].is_modulo,
                 missing: (0..=depth).map(missing).collect(),
                 lines: Classes::new(bins.cells(), ways.len()),
                 footprints: Classes::new(bins.cells(), ways.len()),
@@ -215,7 +226,9 @@ impl LevelTallies {
             }
         };
         Self {
-            tallies: sorted.chunk_by(|a, b| a.0 == b.0).map(tally).collect(),
+            tallies: (sorted.chunk_by(|a, b| (a.is_modulo, a.sets) == (b.is_modulo, b.sets)))
+                .map(tally)
+                .collect(),
         }
     }
 
@@ -245,8 +258,10 @@ impl LevelTallies {
     }
 
     /// Index of the number of sets, and rank of the associativity.
-    pub(super) fn find(&self, (sets, ways): SetsAndWays) -> (usize, usize) {
-        let tree = self.tallies.partition_point(|tally| tally.sets < sets);
-        (tree, self.tallies[tree].rank(ways))
+    pub(super) fn find(&self, shape: Shape) -> (usize, usize) {
+        let place = (shape.is_modulo, shape.sets);
+        let before = |tally: &Tally| (tally.is_modulo, tally.sets) < place;
+        let tree = self.tallies.partition_point(before);
+        (tree, self.tallies[tree].rank(shape.ways))
     }
 }
