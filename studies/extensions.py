@@ -117,7 +117,7 @@ pub(super) fn volumes(_: &CullInput<'_>) -> Result<Volumes, TooWide> {
 }
 '''}, [
         row(f"{CAPTURE}/visibility/src/culling/mod.rs", r"^mod conical;$", "mod example;"),
-        row(f"{CAPTURE}/visibility/src/culling/registry.rs", r"^    ROUND_ROBIN +=", '    EXAMPLE = row("example", "Example", true, "Every draw", super::example::volumes);'),
+        row(f"{CAPTURE}/visibility/src/culling/mod.rs", r"^    ROUND_ROBIN +=", '    EXAMPLE = row("example", "Example", true, "Every draw", example::volumes);'),
     ], "tracegen raster teapot --size 64x64 --cull example -o {out}"),
     ("column", 1, {}, [
         row("replay/report/src/memory_columns.rs", r"^    columns_of::<MemoryResult>", '        .real("example_lines", "example", "lines", 0, |r| r.invalidated_lines)'),

@@ -13,11 +13,11 @@ import zlib
 from .common import ROOT
 
 QUESTIONS = [
-    ("Which tile order should a GPU use, and how sure is that?", "orders -- tracegen raster {scene} --hmd quest2"),
-    ("Which L2 do I need?", "sweep --orders morton,zig-zag+sta+offset --caches 8/64,8/128,8/256,8/512,8/1024 -- tracegen raster {scene} --hmd quest2"),
+    ("Which tile order should a GPU use, and how sure is that?", "orders -- tracegen raster {scene} --hmd quest3"),
+    ("Which L2 do I need?", "sweep --preset adreno-740 --orders morton,zig-zag+sta+offset --vary l2.size_bytes=128KiB,256KiB,512KiB,1MiB,2MiB -- tracegen raster {scene} --hmd quest3"),
     ("What do foveation and culling save?", "techniques -- tracegen techniques {scene} --size 480x540 --frames 4"),
     ("What does reprojection save?", "reproject -- tracegen rays {scene} --size 960x1080"),
-    ("Which share of the DRAM traffic is texture?", "run --frame tile-based --dram lpddr5 -- tracegen raster {scene} --hmd quest2 --geometry"),
+    ("Which share of the DRAM traffic is texture?", "run --preset adreno-740 --frame tile-based -- tracegen raster {scene} --hmd quest3 --geometry"),
 ]
 SHOWN_LINES = 3
 MARKS = "<!-- transcript: {} -->\n", "<!-- end of transcript -->\n"

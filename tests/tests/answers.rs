@@ -17,6 +17,10 @@ fn commands() -> Vec<(&'static str, PathBuf)> {
             traces.clone(),
         ),
         ("orders program.textrace --caches 8/64", traces.clone()),
+        (
+            "orders program.textrace --orders morton,z2-sta,zig-zag+sta+offset+affinity",
+            traces.clone(),
+        ),
         ("locality program.textrace", traces.clone()),
         (
             "schedule atrium.textrace --schedulers z2-sta",
@@ -82,6 +86,37 @@ fn details_add_tables_and_change_no_line() {
             long.starts_with(kept) && long.len() > kept.len(),
             "{command}: {long}"
         );
+    }
+}
+
+/// Answer and condition stand in the first three lines: the sentence about machine or measurement begins there.
+#[test]
+fn the_condition_begins_in_the_first_three_lines() {
+    for (command, folder) in commands() {
+        let text = text(command, &folder);
+        let conditions = ["Machine: ", "Measured at ", "Clients of memory: ", "frames"];
+        let at = text
+            .lines()
+            .position(|line| conditions.iter().any(|of| line.contains(of)));
+        assert!(at.is_some_and(|line| line < 3), "{command}: {text}");
+    }
+}
+
+#[test]
+fn markdown_has_the_cells_of_the_table() {
+    for (command, folder) in commands() {
+        let markdown = text(&format!("{command} --markdown"), &folder);
+        let plain = text(command, &folder);
+        let rows: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
+        assert!(
+            rows.len() > 2 && rows[1].contains("---"),
+            "{command}: {markdown}"
+        );
+        for row in rows[2..].iter().filter(|row| !row.contains("---")) {
+            for cell in row.split('|').map(str::trim) {
+                assert!(plain.contains(cell), "{command}: {cell}");
+            }
+        }
     }
 }
 

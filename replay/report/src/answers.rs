@@ -221,6 +221,7 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], over: &str) -> Vec<Str
             "No order can save here: {} as much from memory as {reference} ({over}).",
             match others(true).count() {
                 1 => "the other order reads".to_owned(),
+                2 => "both other orders read".to_owned(),
                 all => format!("all {all} other orders read"),
             }
         )),

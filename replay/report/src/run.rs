@@ -142,7 +142,7 @@ pub(crate) fn answer(row: &ResultRow) -> Vec<String> {
     let caches = [config.level.l1, config.level.l2].map(|cache| cache.size_bytes);
     let frames = frame_count(row.subject.source.tables());
     let mut out = answers::replayed(&traffic);
-    out.push(answers::machine(config, [caches], &[frames]));
+    out.insert(1, answers::machine(config, [caches], &[frames]));
     out
 }
 

@@ -229,7 +229,7 @@ impl Document for LocalityReport {
             mode: Mode::Functional,
             ..self.config
         };
-        out.push(answers::machine(&config, [caches], &frames));
+        out.insert(1.min(out.len()), answers::machine(&config, [caches], &frames));
         out
     }
 

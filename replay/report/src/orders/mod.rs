@@ -118,13 +118,15 @@ impl Document for OrdersReport<'_> {
 
     /// The means.
     fn text(&self, style: Style) -> String {
-        let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
+        let of_orders = self.means();
+        let means = Table::new(&columns::means(), &of_orders).grouped_by(1);
         let treatments = unique(self.rows.iter().map(|row| row.config.between_frames)).len();
-        let table = means.picked(
-            columns::TERMINAL
-                .into_iter()
-                .skip(usize::from(treatments < 2)),
-        );
+        // The worst of one row is that row.
+        let has_worst = of_orders.iter().any(|mean| mean.rows.len() > 1);
+        let keys = columns::TERMINAL
+            .into_iter()
+            .skip(usize::from(treatments < 2));
+        let table = means.picked(keys.filter(|key| has_worst || *key != "worst_pct"));
         let mut text = table.without_empty_columns().styled(style);
         if !self.learned.is_empty() {
             text += &format!("\n{}", self.learned_table().styled(style));

@@ -124,7 +124,7 @@ pub(super) fn sentences(report: &PaperReport) -> Vec<String> {
         [level.l1.size_bytes, level.l2.size_bytes]
     });
     let frames: Vec<u32> = report.traces.iter().map(|trace| trace.frames).collect();
-    out.push(answers::machine(&report.config, caches, &frames));
+    out.insert(1, answers::machine(&report.config, caches, &frames));
     out
 }
 

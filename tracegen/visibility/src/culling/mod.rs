@@ -1,8 +1,7 @@
 //! Culling techniques, one per file. Each computes the volumes in which draws of a stereo frame may be
 //! visible.
 //!
-//! To add a technique, add a file with a function from a frame to volumes, its `mod` line below, and a row of
-//! the table in `registry.rs`.
+//! To add a technique, add a file with a function from a frame to volumes, its `mod` line and its row below.
 
 mod conical;
 mod conical_round_robin;
@@ -18,10 +17,22 @@ mod tests;
 pub use registry::{Culling, Technique, UnknownCulling};
 pub use superfrustum::Superfrustum;
 
+use self::registry::{row, techniques};
 use crate::hierarchy::{Hierarchy, Scratch};
 use crate::rig::{Rig, TooWide};
 use crate::volume::{Prepared, Volume, frustum};
 use glam::{DVec3, Mat4};
+
+techniques! {
+    // constant                  name                    title                              inside the lens, nothing visible is lost   help
+    NONE                 = row("none",                 "No culling",                      true,  "Every draw, in both eyes", none::volumes);
+    PER_EYE              = row("per-eye",              "Per-eye frustum culling",         true,  "What enters either eye's frustum: two frusta, their lists merged", per_eye::volumes);
+    SUPERFRUSTUM         = row("superfrustum",         "Superfrustum culling",            true,  "What enters one frustum around both eyes'", superfrustum::volumes);
+    ROUND_ROBIN          = row("round-robin",          "Round-robin culling",             false, "What enters the left eye's frustum in even frames, the right eye's in odd ones", round_robin::volumes);
+    CONICAL              = row("conical",              "Conical culling",                 true,  "What enters the part of either eye's frustum that its lens shows", conical::volumes);
+    CONICAL_ROUND_ROBIN  = row("conical-round-robin",  "Conical round-robin culling",     false, "What the left eye's lens shows in even frames, the right eye's in odd ones", conical_round_robin::volumes);
+    CONICAL_SUPERFRUSTUM = row("conical-superfrustum", "Conical superfrustum culling",    true,  "What enters one cone around what both lenses show", conical_superfrustum::volumes);
+}
 
 /// Inputs that determine the volumes of a frame.
 pub(crate) struct CullInput<'a> {

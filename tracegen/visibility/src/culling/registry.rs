@@ -1,9 +1,6 @@
-//! The table of culling techniques, from which flags, settings, help and error messages are generated.
+//! The rows of the table of culling techniques, from which flags, settings, help and error messages are generated.
 
-use super::{CullInput, Volumes};
-use super::{
-    conical, conical_round_robin, conical_superfrustum, none, per_eye, round_robin, superfrustum,
-};
+use super::{CullInput, NAMES, TABLE, Volumes};
 use crate::rig::TooWide;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
@@ -19,7 +16,7 @@ pub struct Technique {
     volumes: fn(&CullInput<'_>) -> Result<Volumes, TooWide>,
 }
 
-const fn row(
+pub(super) const fn row(
     name: &'static str,
     title: &'static str,
     lossless: bool,
@@ -45,24 +42,15 @@ macro_rules! techniques {
         }
 
         const TABLE: &[Culling] = &[$(Culling::$id),+];
-        const NAMES: &[&str] = &[$(Culling::$id.0.name),+];
+        const NAMES: &[&str] = &[$(Culling::$id.name()),+];
     };
 }
 
-techniques! {
-    // constant                  name                    title                              inside the lens, nothing visible is lost   help
-    NONE                 = row("none",                 "No culling",                      true,  "Every draw, in both eyes", none::volumes);
-    PER_EYE              = row("per-eye",              "Per-eye frustum culling",         true,  "What enters either eye's frustum: two frusta, their lists merged", per_eye::volumes);
-    SUPERFRUSTUM         = row("superfrustum",         "Superfrustum culling",            true,  "What enters one frustum around both eyes'", superfrustum::volumes);
-    ROUND_ROBIN          = row("round-robin",          "Round-robin culling",             false, "What enters the left eye's frustum in even frames, the right eye's in odd ones", round_robin::volumes);
-    CONICAL              = row("conical",              "Conical culling",                 true,  "What enters the part of either eye's frustum that its lens shows", conical::volumes);
-    CONICAL_ROUND_ROBIN  = row("conical-round-robin",  "Conical round-robin culling",     false, "What the left eye's lens shows in even frames, the right eye's in odd ones", conical_round_robin::volumes);
-    CONICAL_SUPERFRUSTUM = row("conical-superfrustum", "Conical superfrustum culling",    true,  "What enters one cone around what both lenses show", conical_superfrustum::volumes);
-}
+pub(super) use techniques;
 
 /// A culling technique: a reference to its row. It is serialised as its name.
 #[derive(Clone, Copy, Debug)]
-pub struct Culling(&'static Technique);
+pub struct Culling(pub(super) &'static Technique);
 
 impl Culling {
     /// Every technique, in the order of the table.
@@ -76,7 +64,7 @@ impl Culling {
     }
 
     /// Name in flags, settings and results.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         self.0.name
     }
 
