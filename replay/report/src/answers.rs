@@ -456,14 +456,12 @@ pub fn recommended(studies: &[(String, Option<f64>, bool)]) -> Vec<String> {
                 .to_owned()
         }
         (1, _) => "The recommended choice of the study is its reference.".to_owned(),
-        (all, 0) => format!(
-            "In all {all} studies, the recommended choice is another method than the reference."
-        ),
+        (all, 0) => format!("All {all} studies recommend another method than the reference."),
         (all, some) if all == some => {
-            format!("In all {all} studies, the reference is the recommended choice.")
+            format!("All {all} studies recommend the reference.")
         }
         (all, some) => format!(
-            "In {} of {all} studies, the recommended choice is another method than the reference; the reference stays in {}.",
+            "{} of {all} studies recommend another method than the reference; the reference stays in {}.",
             all - some,
             list(&references, 3)
         ),

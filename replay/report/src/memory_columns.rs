@@ -32,7 +32,7 @@ pub fn columns() -> Vec<Column<'static, MemoryResult>> {
         .real("dram_read_bytes", "DRAM reads", "bytes", 0, dram(|d| d.read_bytes))
             .about("bytes of whole bursts; more than the lines if these are smaller than a burst")
         .real("dram_bandwidth_gb_per_s", "bandwidth", "GB/s", 2, dram(|d| d.bandwidth_gb_per_s))
-            .about("bytes read over the time of the replay; in functional mode, at the DRAM's full speed")
+            .about("DRAM read rate; in functional mode, that of a DRAM that is always busy")
         .real("dram_peak_gb_per_s", "peak", "GB/s", 1, dram(|d| d.peak_gb_per_s))
             .about("peak bandwidth of the data buses")
         .real("dram_latency_mean_ns", "latency", "ns", 1, dram(|d| d.latency_mean_ns))

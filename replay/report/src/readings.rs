@@ -260,7 +260,8 @@ impl ReadingsReport {
             bounds().filter(|[least, _]| *least >= 1.0).count(),
         );
         text.push(format!(
-            "If the energies are scaled to 14 nm, it saves energy at every scaling within the bounds under {always}, and at none under {never}."
+            "With energies scaled to 14 nm, {always} of {count} readings save energy at any scaling, {never} at none, and {} at some.",
+            count - always - never
         ));
         if let Some(fit) = self.chosen.and_then(|index| self.fits.get(index)) {
             let distance = |d: Option<f64>| d.map_or("-".to_owned(), |d| format!("{d:.3}"));

@@ -229,7 +229,10 @@ impl Document for LocalityReport {
             mode: Mode::Functional,
             ..self.config
         };
-        out.insert(1.min(out.len()), answers::machine(&config, [caches], &frames));
+        out.insert(
+            1.min(out.len()),
+            answers::machine(&config, [caches], &frames),
+        );
         out
     }
 
