@@ -21,7 +21,7 @@ OPTIONS = {
 # Inputs below OUT/screenshots, and the commands that make them. A command for a file that is there already is left out.
 GOLDEN = ["atrium.textrace", "jungle.textrace", "chess-rays.raytrace", "teapot-rays.raytrace"]
 INPUTS = {
-    "inputs/atrium.textrace": "raster -q atrium --size 240x270 --image inputs/atrium.png -o inputs/atrium.textrace",
+    "inputs/atrium.textrace": "raster -q atrium --size 240x270 --geometry --image inputs/atrium.png -o inputs/atrium.textrace",
     "inputs/head.textrace": "raster -q atrium --size 120x135 --path head --frames 4 --no-plain -o inputs/head.textrace",
     "inputs/truth.textrace": "verify -q atrium --trace inputs/atrium.textrace --write-reference inputs/truth.textrace",
     # Goes on where an interrupted run was.
@@ -31,7 +31,7 @@ PAGES = [
     "report inputs/atrium.textrace --image atrium=inputs/atrium.png -o pages/report.html",
     "report inputs/atrium.textrace --as atrium=crytek-sponza --orders all -o pages/report-orders.html",
     "paper golden/atrium.textrace golden/jungle.textrace --functional --html pages/paper.html",
-    "view inputs/atrium.textrace --image inputs/atrium.png -o pages/view.html",
+    "view inputs/atrium.textrace --frame tile-based --image inputs/atrium.png -o pages/view.html",
     "view golden/chess-rays.raytrace -o pages/view-rays.html",
     "sweep inputs/sweep.toml golden/atrium.textrace -o sweep",
     "locality inputs/atrium.textrace --orders all --html pages/locality.html",

@@ -63,4 +63,5 @@ mod tutorial;
 mod verify;
 mod verify_damage;
 mod view;
+mod view_content;
 mod whole_frame;

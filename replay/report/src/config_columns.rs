@@ -137,8 +137,8 @@ pub fn config<'a>() -> Vec<PointColumn<'a>> {
         ],
         "dram" => table(DramConfig::KEYS, |c| c.dram),
         "frame" => table(FrameConfig::KEYS, |c| c.frame),
-        // Not a key of configuration files.
-        "timeline" => Vec::new(),
+        // No keys of configuration files.
+        "timeline" | "l2_changes" => Vec::new(),
         _ => vec![cell(of_run, &value(&defaults), move |c| Some(value(c)))],
     });
     columns.flatten().collect()

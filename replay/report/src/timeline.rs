@@ -129,6 +129,7 @@ mod tests {
         let timeline = Timeline {
             items: vec![item(0, 0, 1000, 5), item(1, 10, 10, 6)],
             fetched_lines: vec![64, 0, 128],
+            l2_changes: Vec::new(),
         };
         let text = json(&timeline, &tables, 16).unwrap();
         let found: Value = serde_json::from_str(&text).unwrap();

@@ -101,6 +101,9 @@ settings! {
         /// configuration files.
         #[serde(skip)]
         pub timeline: bool = false;
+        /// With `timeline`, also record the content of the L2 (`replay view`); not a key of configuration files.
+        #[serde(skip)]
+        pub l2_changes: bool = false;
         /// Hidden-surface removal. Results name it if it is not the default.
         #[serde(skip_serializing_if = "is_default")]
         pub hsr: Hsr = Hsr::EarlyZ;
@@ -202,6 +205,11 @@ impl RunConfig {
     /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
     pub fn misses_change_caches_at_once(&self) -> bool {
         self.level.l2.hit_cycles == 0 || self.tmu.allocation == Allocation::OnMiss
+    }
+
+    /// True if the changes of the L2's content are recorded. A sectored cache does not report its evictions.
+    pub fn records_l2(&self) -> bool {
+        self.timeline && self.l2_changes && self.level.l2.sectors == 1
     }
 
     /// True if the order of the L2's misses matters, because further levels, DRAM or a prefetcher see them.

@@ -280,6 +280,17 @@ pub struct TimelineItem {
     pub tiles: Vec<TileAt>,
 }
 
+/// A line enters or leaves the L2, or one of several private ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct L2Change {
+    /// Cycle of the first request after it.
+    pub cycle: u64,
+    /// Number of the line: address over the line size; [`EMPTY`](crate::memory::EMPTY) if the cache was emptied.
+    pub line: u32,
+    /// True if the line is in the cache from then on.
+    pub is_there: bool,
+}
+
 /// A timed replay over time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Timeline {
@@ -287,6 +298,9 @@ pub struct Timeline {
     pub items: Vec<TimelineItem>,
     /// Lines fetched by the L2, prefetches included, per interval of [`Self::INTERVAL_CYCLES`].
     pub fetched_lines: Vec<u32>,
+    /// By frame, changes of the L2's content in the order of time; empty unless requested. What happens between two
+    /// frames is at the start of the later one.
+    pub l2_changes: Vec<Vec<L2Change>>,
 }
 
 impl Timeline {

@@ -98,7 +98,7 @@ enum Command {
     #[command(mut_args(without(&["order", "l1", "l2"])))]
     Report(Box<report::Args>),
     /// Write a page to explore tiles: maps of misses, and orders as an animation.
-    #[command(mut_args(without(&["order"])))]
+    #[command(mut_args(without(&["order", "count_by"])))]
     View(Box<view::Args>),
     /// Compare stereo rendering techniques: frame time, image error, cache misses.
     Techniques(Box<techniques::Args>),

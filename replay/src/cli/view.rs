@@ -9,10 +9,11 @@ use formats::Trace;
 use report::picture::EmbeddedPicture;
 use report::view::ViewReport;
 use shell::Output;
+use sim::config::CountBy;
 use sim::config::RunConfig;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::experiment::{Plan, pass_tiles};
+use studies::experiment::Plan;
 
 /// Orders that a page compares.
 const MOST_ORDERS: usize = 4;
@@ -85,24 +86,32 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return write(args, &super::reproject::view(&args.trace)?, prints);
     }
     let caches = (base.level.l1.size_bytes, base.level.l2.size_bytes);
-    let plan = Plan::paper(base, &[caches], &orders, false)?;
+    let plan = |base| Plan::paper(base, &[caches], &orders, false);
+    let by_draw = RunConfig {
+        count_by: CountBy::Draw,
+        tile_maps: false,
+        timeline: false,
+        ..base
+    };
+    let (plan, by_draw) = (plan(base)?, plan(by_draw)?);
     let traces = Traces::open(std::slice::from_ref(&args.trace))?;
     let subjects = traces.subjects();
     let picture = args.image.as_deref();
     let picture = picture.map(|path| EmbeddedPicture::open(&subjects[0].label, path));
     let picture = picture.transpose()?;
     let outcome = replayed(&plan, &subjects, None)?;
+    let draws = replayed(&by_draw, &subjects, None)?;
     let report = ViewReport {
         rows: &outcome.rows(),
-        tiles: &pass_tiles(subjects[0].source, &base)?,
+        draws: &draws.rows(),
         picture: picture.as_ref(),
     };
     let (page, left_out) = report.page()?;
-    if !left_out.is_empty() {
+    if left_out > 0 {
         shell::warn(&format!(
             "{}: {} frames left out, to keep the page below 5 MB; capture fewer frames",
             args.output.display(),
-            left_out.len()
+            left_out
         ));
     }
     write(args, &page, prints)
@@ -112,6 +121,8 @@ fn machine(args: &ConfigArgs) -> Result<RunConfig> {
     Ok(RunConfig {
         tile_maps: true,
         timeline: true,
+        l2_changes: true,
+        count_by: CountBy::Texture,
         ..args.resolve()?
     })
 }

@@ -7,7 +7,7 @@ pub mod model;
 pub mod page;
 pub mod plots;
 pub mod tables;
-mod whole_frame;
+pub(crate) mod whole_frame;
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -8,7 +8,7 @@ use crate::html::{Section, figures};
 use crate::plots::stacked::StackedChart;
 use crate::plots::{PlotError, SeriesStyle};
 use crate::table::Table;
-use maud::html;
+use maud::{Markup, html};
 use sim::memory::Client;
 use sim::result::ClientTraffic;
 use studies::experiment::ResultRow;
@@ -54,6 +54,19 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
         p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together. mW are the power of this traffic in the DRAM of the configuration (LPDDR4 by default): writes count as reads, every second burst opens a row, standby and refresh are left out." }
     };
     Ok(Some(Section::new("Traffic by client", body)))
+}
+
+/// The bars of the orders of a trace.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub(crate) fn of_orders(scene: &str, rows: &[&ResultRow]) -> Result<Markup, PlotError> {
+    let table = Table::new(&columns(), rows.iter().copied());
+    Ok(html! {
+        (figures(&[(chart(scene, rows).svg()?, String::new())]))
+        p.note { "Means over the frames, as " code { "replay run --frame" } " counts them. An order changes only the reads of textures and shaded vertices." }
+        (table.without_empty_columns().markup())
+    })
 }
 
 fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {

@@ -2,6 +2,7 @@
 
 use super::hashed_index::HashedIndex;
 use super::policy::{AnyCache, Geometry, boxed};
+use super::recorded::Recorded;
 use super::sectored::Sectored;
 use super::victim::WithVictimCache;
 use super::watched::Watched;
@@ -40,5 +41,11 @@ impl AnyCache {
     #[must_use]
     pub(super) fn watched(self) -> Self {
         boxed(Watched::new(self.into_box()))
+    }
+
+    /// Wraps the cache so that it records the changes of its content.
+    #[must_use]
+    pub(super) fn recorded(self) -> Self {
+        boxed(Recorded::new(self.into_box()))
     }
 }

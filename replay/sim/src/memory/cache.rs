@@ -4,8 +4,10 @@
 //! missing line is filled only after the miss penalty: [`Cache::lookup`] when it is requested,
 //! [`Cache::fill`] when it arrives.
 
+use super::recorded::Change;
+
 /// Tag of an empty way; no line has this number.
-pub(super) const EMPTY: u32 = u32::MAX;
+pub const EMPTY: u32 = u32::MAX;
 
 /// A cache of whole lines. Its state after a series of look-ups depends only on the order of the
 /// last look-up of each resident line, so earlier look-ups need no simulation.
@@ -29,6 +31,9 @@ pub trait Cache: Send {
 
     /// Appends the lines evicted since the last call, if the cache records them.
     fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
+
+    /// Appends the changes of its content since the last call, if the cache records them.
+    fn take_changes(&mut self, _changes: &mut Vec<Change>) {}
 
     /// Removes all lines.
     fn clear(&mut self);
@@ -72,6 +77,10 @@ impl Cache for Box<dyn Cache> {
 
     fn take_evicted(&mut self, lines: &mut Vec<u32>) {
         (**self).take_evicted(lines);
+    }
+
+    fn take_changes(&mut self, changes: &mut Vec<Change>) {
+        (**self).take_changes(changes);
     }
 
     fn clear(&mut self) {

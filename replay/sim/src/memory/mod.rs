@@ -24,6 +24,7 @@ mod hierarchy;
 mod in_flight;
 mod policy;
 mod prefetch;
+mod recorded;
 mod sectored;
 mod server;
 mod simple_memory;
@@ -31,7 +32,7 @@ mod victim;
 mod watched;
 
 pub use access::{Access, Client};
-pub use cache::Cache;
+pub use cache::{Cache, EMPTY};
 pub use calendar::Calendar;
 pub use fast::Forest;
 pub(crate) use hashed_index::hashed;
@@ -39,6 +40,7 @@ pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, Secon
 pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
 pub use policy::{AnyCache, AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};
 pub use prefetch::Prefetching;
+pub use recorded::Change;
 pub use server::{Served, Servers, TICKS, ticks};
 pub use simple_memory::SimpleMemory;
 

@@ -8,6 +8,7 @@
 mod calibration;
 mod file;
 mod keys;
+mod l2_content;
 mod outcome;
 mod plan;
 mod rows;
@@ -15,11 +16,13 @@ mod runner;
 mod split;
 mod store;
 mod subject;
+mod texels;
 mod tiles;
 
 pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
 pub use file::{ExperimentFile, parse_config};
 pub use keys::CACHES;
+pub use l2_content::{FULL, FrameContent, L2Content, STEPS, Share};
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};
@@ -28,7 +31,8 @@ pub use split::{Split, Task};
 pub use store::point_schema;
 pub use store::{Absent, POINT_SCHEMA, Store, StoredPoint, point_key};
 pub use subject::{Subject, frame_count, has_shadow_maps, labels, scene_label};
-pub use tiles::{PassTiles, pass_tiles};
+pub use texels::{LevelReads, level_reads};
+pub use tiles::{BOTH_EYES, Counts, FrameTiles, PassTiles, Read, frame_tiles};
 
 #[cfg(test)]
 mod tests;

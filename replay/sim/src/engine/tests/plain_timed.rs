@@ -407,3 +407,45 @@ fn compiled_and_general_caches_agree() {
         replay(&trace, &config).unwrap()
     );
 }
+
+#[test]
+fn the_recorded_content_of_the_l2_is_the_plain_machines() {
+    let trace = layered([52, 36], 17, 4);
+    let mut most = 0;
+    for (order, replacement, allocation, shared) in [
+        (Order::Z2_STA, Replacement::LRU, Allocation::OnFill, true),
+        (Order::MORTON, Replacement::FIFO, Allocation::OnMiss, true),
+        (Order::Z2_LRTA, Replacement::LRU, Allocation::OnFill, false),
+    ] {
+        let mut config = RunConfig {
+            mode: Mode::Timed,
+            timeline: true,
+            l2_changes: true,
+            ..functional(order)
+        };
+        config.tmu.allocation = allocation;
+        (config.level.l2.replacement, config.level.l2.shared) = (replacement, shared);
+        let timeline = replay(&trace, &config).unwrap().timeline.unwrap();
+        let [changes] = timeline.l2_changes.as_slice() else {
+            panic!("one frame")
+        };
+        assert!(changes.is_sorted_by_key(|of| of.cycle));
+        let mut found: HashMap<u32, i32> = HashMap::new();
+        for of in changes {
+            *found.entry(of.line).or_default() += if of.is_there { 1 } else { -1 };
+        }
+        let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
+        let mut plain = PlainTimed::new(&config, &bins);
+        alone(&trace, &config, &mut plain);
+        for level in &mut plain.l2 {
+            level.arrive(plain.cycles);
+        }
+        for (line, count) in found {
+            let caches = plain.l2.iter();
+            let expected = caches.filter(|of| of.cache.contains(line)).count();
+            assert_eq!(count as usize, expected, "{order:?}: {line}");
+            most += expected;
+        }
+    }
+    assert!(most > 100, "{most}");
+}

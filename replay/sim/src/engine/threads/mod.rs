@@ -119,6 +119,7 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
             }
             self.cycles = self.model.end_phase();
         }
+        self.shared.l2.end_frame(self.cycles);
         Ok(())
     }
 
@@ -136,7 +137,7 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
             BetweenFrames::Keep => (),
             BetweenFrames::Flush => {
                 l1.iter_mut().for_each(D::clear);
-                l2.clear();
+                l2.clear(self.cycles);
             }
             BetweenFrames::Lose(percent) => {
                 l1.iter_mut().for_each(D::clear);

@@ -101,7 +101,7 @@ impl<C: Cache> Hierarchy<C> {
     /// Empties all caches.
     pub fn clear(&mut self) {
         self.l1.iter_mut().for_each(C::clear);
-        self.l2.clear();
+        self.l2.clear(0);
     }
 
     /// Empties the L1 caches, and other work fills part of each other cache.

@@ -46,16 +46,21 @@ impl Caches<AnyCache> {
         };
         let l2 = &config.level.l2;
         let second = |core| build(l2, "L2", if core == 0 { 0 } else { config.cores + core });
-        let watched = |l2: AnyCache| match config.level.depend_on_evictions() {
-            true => l2.watched(),
-            false => l2,
+        let observed = |mut l2: AnyCache| {
+            if config.level.depend_on_evictions() {
+                l2 = l2.watched();
+            }
+            match config.records_l2() {
+                true => l2.recorded(),
+                false => l2,
+            }
         };
         Ok(Self {
             l1: (1..=config.level.l1.caches(config.cores))
                 .map(|core| build(&config.level.l1, "L1", core))
                 .collect::<Result<_, _>>()?,
             l2: (0..l2.caches(config.cores))
-                .map(|core| Ok(watched(second(core)?)))
+                .map(|core| Ok(observed(second(core)?)))
                 .collect::<Result<_, ConfigError>>()?,
         })
     }

@@ -8,8 +8,8 @@ use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::memory::cache::EMPTY;
 use crate::memory::in_flight::{DelayedFill, Immediate, LimitedMshrs, NOT_IN_FLIGHT};
 use crate::memory::prefetch::{Demand, Prefetcher};
-use crate::memory::{Access, Cache};
-use crate::result::{MemoryResult, MshrResult, PrefetchResult, Timeline};
+use crate::memory::{Access, Cache, Change};
+use crate::result::{L2Change, MemoryResult, MshrResult, PrefetchResult, Timeline};
 use formats::layout::Layout;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -24,10 +24,12 @@ pub struct MissPath {
     mshrs: Vec<LimitedMshrs>,
     /// Present if levels depend on each other's evictions.
     evictions: Option<Evictions>,
-    /// True if a request has effects after its answer: prefetches or evictions to process.
+    /// True if a request has effects after its answer: prefetches or evictions to process, or changes to record.
     has_consequences: bool,
     /// Fetches per interval of time, if recorded.
     fetched_lines: Option<Vec<u32>>,
+    /// Changes of the L2's content, if recorded.
+    changes: Option<Changes>,
 }
 
 impl MissPath {
@@ -41,6 +43,7 @@ impl MissPath {
             evictions: None,
             has_consequences: false,
             fetched_lines: None,
+            changes: None,
         }
     }
 
@@ -62,8 +65,11 @@ impl MissPath {
                 .collect(),
             mshrs: limited.map(|_| LimitedMshrs::new(mshrs)).collect(),
             evictions: Evictions::build(config),
-            has_consequences: config.prefetch.is_some() || config.level.depend_on_evictions(),
+            has_consequences: config.prefetch.is_some()
+                || config.level.depend_on_evictions()
+                || config.records_l2(),
             fetched_lines: config.timeline.then(Vec::new),
+            changes: config.records_l2().then(Changes::default),
         })
     }
 
@@ -110,6 +116,14 @@ impl MissPath {
         }
         self.below.read(core, line, Some(now))
     }
+}
+
+/// The changes of finished frames, those after them, and those of one cache since the last request.
+#[derive(Default)]
+struct Changes {
+    frames: Vec<Vec<L2Change>>,
+    all: Vec<L2Change>,
+    new: Vec<Change>,
 }
 
 /// A prefetcher and the state of its lines.
@@ -219,6 +233,11 @@ impl<C> SecondLevel<C> {
         self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
+    /// Changes of the L2's content by frame; empty if not recorded.
+    pub fn changes(&self) -> &[Vec<L2Change>] {
+        self.path.changes.as_ref().map_or(&[], |of| &of.frames)
+    }
+
     /// Maximum number of lines of the next work item to prefetch when an item starts.
     pub fn lines_of_next_item(&self) -> usize {
         let prefetch = self.path.prefetch.first();
@@ -271,8 +290,38 @@ impl<D: DelayedFill> SecondLevel<D> {
         if self.path.has_consequences {
             self.prefetch(core, line, now, answer);
             self.follow_evictions(now);
+            self.record(now);
         }
         answer
+    }
+
+    /// Records what has changed in the L2 up to the request at `now`.
+    #[inline(never)]
+    fn record(&mut self, now: u64) {
+        let Some(Changes { all, new, .. }) = &mut self.path.changes else {
+            return;
+        };
+        for cache in &mut self.level.caches {
+            cache.take_changes(new);
+            all.extend(new.drain(..).map(|(line, is_there)| L2Change {
+                cycle: now,
+                line,
+                is_there,
+            }));
+        }
+    }
+
+    /// Ends a frame: lines that have arrived by `now` enter the L2, if its changes are recorded.
+    pub fn end_frame(&mut self, now: u64) {
+        if self.path.changes.is_some() {
+            for cache in &mut self.level.caches {
+                cache.arrival(EMPTY, now);
+            }
+            self.record(now);
+        }
+        if let Some(Changes { frames, all, .. }) = &mut self.path.changes {
+            frames.push(std::mem::take(all));
+        }
     }
 
     #[inline(never)]
@@ -318,6 +367,7 @@ impl<D: DelayedFill> SecondLevel<D> {
             wanted.extend_from_slice(lines);
             self.fetch_wanted(core, now);
             self.follow_evictions(now);
+            self.record(now);
         }
     }
 
@@ -338,13 +388,14 @@ impl<D: DelayedFill> SecondLevel<D> {
     }
 
     /// Empties the levels and drops the lines in flight.
-    pub fn clear(&mut self) {
+    pub fn clear(&mut self, now: u64) {
         self.level.caches.iter_mut().for_each(D::clear);
         self.path.below.clear();
         self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
         for prefetch in &mut self.path.prefetch {
             prefetch.unused.clear();
         }
+        self.record(now);
     }
 
     /// Other work fills part of each cache. Its lines arrive at `now`.
@@ -364,6 +415,7 @@ impl<D: DelayedFill> SecondLevel<D> {
         self.follow_evictions(now);
         self.path.below.lose(other);
         self.follow_evictions(now);
+        self.record(now);
     }
 }
 

@@ -4,7 +4,7 @@
 //! A line in flight can be evicted before it arrives. Look-ups until its arrival still merge with
 //! its fetch; later ones miss. (Hardware that never evicts a line in flight must stall instead.)
 
-use super::{Cache, Delay, DelayedFill, Mshrs, NOT_IN_FLIGHT};
+use super::{Cache, Change, Delay, DelayedFill, Mshrs, NOT_IN_FLIGHT};
 
 /// A cache to be converted to allocation on a miss.
 pub struct AllocateOnMiss(pub Box<dyn Cache>);
@@ -56,6 +56,10 @@ impl DelayedFill for Reserved {
 
     fn take_evicted(&mut self, lines: &mut Vec<u32>) {
         self.cache.take_evicted(lines);
+    }
+
+    fn take_changes(&mut self, changes: &mut Vec<Change>) {
+        self.cache.take_changes(changes);
     }
 
     fn clear(&mut self) {

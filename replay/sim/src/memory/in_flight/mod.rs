@@ -15,7 +15,7 @@ pub use immediate::Immediate;
 pub use limited_mshrs::LimitedMshrs;
 pub use table::Mshrs;
 
-use super::Cache;
+use super::{Cache, Change};
 use calendar::InFlight;
 
 /// The arrival of a line that is not in flight.
@@ -56,6 +56,9 @@ pub trait DelayedFill: Send {
 
     /// Appends the lines evicted since the last call, if the cache records them.
     fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
+
+    /// Appends the changes of the content since the last call, if the cache records them.
+    fn take_changes(&mut self, _changes: &mut Vec<Change>) {}
 
     /// Empties the cache and drops the lines in flight.
     fn clear(&mut self);
@@ -135,6 +138,10 @@ impl<C: Cache> DelayedFill for TimeOrder<C> {
 
     fn take_evicted(&mut self, lines: &mut Vec<u32>) {
         self.cache.take_evicted(lines);
+    }
+
+    fn take_changes(&mut self, changes: &mut Vec<Change>) {
+        self.cache.take_changes(changes);
     }
 
     fn clear(&mut self) {

@@ -105,6 +105,6 @@ impl ThreadModel for Looping {
 
     fn complete<D: DelayedFill>(&self, shared: &Shared<D>, outcome: &mut MachineOutcome) {
         let recorder = self.recorder.as_ref();
-        outcome.timeline = recorder.map(|of| of.timeline(shared.l2.fetched_lines()));
+        outcome.timeline = recorder.map(|of| of.timeline(&shared.l2));
     }
 }

@@ -1,5 +1,6 @@
 //! Records the tiles that each core works on over time, for `replay run --timeline`.
 
+use crate::memory::SecondLevel;
 use crate::order::WorkItem;
 use crate::result::{TileAt, Timeline, TimelineItem};
 use crate::tmu::PipelineStats;
@@ -46,11 +47,12 @@ impl Recorder {
         });
     }
 
-    /// All items, sorted by start and core, and the lines fetched in each interval.
-    pub fn timeline(&self, fetched_lines: &[u32]) -> Timeline {
+    /// All items, sorted by start and core, and what the L2 recorded.
+    pub fn timeline<D>(&self, l2: &SecondLevel<D>) -> Timeline {
         let mut timeline = self.timeline.clone();
         (timeline.items).sort_by_key(|item| (item.start_cycle, item.core));
-        timeline.fetched_lines = fetched_lines.to_vec();
+        timeline.fetched_lines = l2.fetched_lines().to_vec();
+        timeline.l2_changes = l2.changes().to_vec();
         timeline
     }
 }
