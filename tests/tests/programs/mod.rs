@@ -483,7 +483,14 @@ fn a_list_has_every_render_pass_with_its_picture() {
         assert_eq!(cells[4], OBJECTS.len().to_string(), "{table}");
     }
     let html = std::fs::read_to_string(&page).expect("the page");
-    let pictures: Vec<&str> = html.split("data:image/png;base64,").skip(1).collect();
+    let pictures = |of: &str| -> Vec<&str> {
+        let texts = html.split(of).skip(1);
+        let data = texts.filter_map(|text| text.split("data:image/png;base64,").nth(1));
+        data.filter_map(|data| data.split('"').next()).collect()
+    };
+    let of_draws = pictures("<img alt=\"pixels of draw ");
+    assert_eq!(of_draws.len(), 2 * OBJECTS.len(), "a picture of each draw");
+    let pictures = pictures("<img alt=\"pass ");
     assert_eq!(pictures.len(), 2, "a picture of each pass");
     assert!(
         pictures.iter().all(|data| data.len() > 2_000),

@@ -1,7 +1,9 @@
-//! Lists the render passes of a frame, as a table and as a page with pictures.
+//! Lists the render passes of a frame, as a table and as a page with pictures of passes and draws.
 
+mod draws;
 mod page;
 
+pub use draws::DrawRow;
 pub use page::page;
 
 use crate::drain::weight;
@@ -58,8 +60,12 @@ pub struct PassRow {
     pub textures: usize,
     /// Size of these textures in bytes, with all levels.
     pub texture_bytes: u64,
+    /// Size of the target.
+    pub target_size: [u32; 2],
     /// Picture of the target.
     pub picture: Option<Thumbnail>,
+    /// Its draws; empty without pictures.
+    pub draw_rows: Vec<DrawRow>,
 }
 
 /// The render passes of a frame.
@@ -110,12 +116,21 @@ fn rows(
             bottom_up.push(false);
         }
         let row = &mut rows[number];
-        row.draws += 1;
         // Draws that are not recorded have only the count of their query.
-        row.fragments += match session.draw(executed.draw).and_then(|draw| draw.shader) {
+        let fragments = match session.draw(executed.draw).and_then(|draw| draw.shader) {
             Some(_) => weights[place],
             None => executed.occlusion.unwrap_or(0),
         };
+        let mut draw = DrawRow {
+            number: row.draws,
+            shows: views.map(|views| views.roles[place]),
+            fragments,
+            samples: 0,
+            textures: 0,
+            covered: None,
+        };
+        row.draws += 1;
+        row.fragments += fragments;
         if let Some(views) = views {
             add_once(&mut row.shows, views.roles[place]);
         }
@@ -129,7 +144,13 @@ fn rows(
             add_once(&mut row.caveats, caveat.clone());
         }
         if let (Some(shader), Some(of)) = (session.shader_of(info), records.get(&executed.draw)) {
-            row.samples += samples(shader, of);
+            draw.samples = samples(shader, of);
+            row.samples += draw.samples;
+            draw.covered = Some(draws::covered(of, row.target_size));
+        }
+        draw.textures = info.textures.iter().filter(|of| of.view.is_some()).count();
+        if row.picture.is_some() {
+            row.draw_rows.push(draw);
         }
         textures[number].extend(info.textures.iter().filter_map(|texture| texture.view));
     }
@@ -153,6 +174,9 @@ fn rows(
         .filter(|(_, bottom_up)| *bottom_up)
     {
         row.picture = row.picture.take().map(Thumbnail::upside_down);
+        for draw in &mut row.draw_rows {
+            draw.covered = draw.covered.take().map(Thumbnail::upside_down);
+        }
     }
     rows
 }
@@ -166,10 +190,13 @@ fn add_once<T: PartialEq>(all: &mut Vec<T>, one: T) {
 
 fn empty_row(session: &Session, number: usize, pass: u32) -> PassRow {
     let info = session.pass(pass).cloned().unwrap_or_default();
-    let name = |view: &ViewInfo| {
-        let size = session.image(view.image).map_or([0; 2], |image| {
+    let size = |view: &ViewInfo| {
+        session.image(view.image).map_or([0; 2], |image| {
             [0, 1].map(|axis| (image.size[axis] >> view.levels[0]).max(1))
-        });
+        })
+    };
+    let name = |view: &ViewInfo| {
+        let size = size(view);
         let format = vk::Format::from_raw(view.format);
         format!("{}x{} {format:?}", size[0], size[1])
     };
@@ -182,6 +209,7 @@ fn empty_row(session: &Session, number: usize, pass: u32) -> PassRow {
     PassRow {
         number,
         target,
+        target_size: (info.colors.first().or(info.depth.as_ref())).map_or([0; 2], size),
         views: info.view_mask.count_ones(),
         picture: (session.picture(pass)).map(|(size, texels)| Thumbnail { size, texels }),
         ..PassRow::default()
