@@ -24,6 +24,7 @@ const ORDERS: &str = "morton,z2-sta";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay view atrium.textrace -o view.html
+  replay view atrium.textrace --frame tile-based -o view.html    # captured with --geometry: traffic of all clients
   replay view chess.raytrace -o view.html
   replay view atrium.textrace --orders morton,zig-zag+sta+offset --image atrium.png -o view.html")]
 pub struct Args {

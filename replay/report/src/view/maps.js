@@ -77,20 +77,30 @@ const fillWords = (pass, at, number, now) => {
       : ramp[Math.min(255, 255 * shown[tile] / most | 0)];
   }
 };
+// What stays the same lies below the tiles, on a canvas of its own: the picture and the names.
+const isShown = pass => picture && picture.complete && pass.eye !== null;
+const drawStill = (canvas, { list, height }) => {
+  const key = [canvas.clientWidth, state.frame, inks.fg, devicePixelRatio, isShown(frame().passes[0])].join();
+  if (canvas.key === key) return;
+  canvas.key = key;
+  const ink = fit(canvas, height);
+  frame().passes.forEach((pass, at) => {
+    const { x, y, w, h } = list[at], half = isShown(pass) && picture.naturalWidth / 2;
+    if (half) ink.drawImage(picture, pass.eye * half, 0, half, picture.naturalHeight, x, y, w, h);
+    ink.fillStyle = inks.fg;
+    ink.fillText(pass.name, x, y - 5);
+  });
+};
 const drawRun = (canvas, number) => {
-  const { list, height } = places(canvas.clientWidth);
+  const all = places(canvas.clientWidth), { list, height } = all;
+  drawStill(canvas.previousSibling, all);
   const ink = fit(canvas, height), run = frame().runs[number], now = clock(run);
   ink.imageSmoothingEnabled = false;
   frame().passes.forEach((pass, at) => {
     const { x, y, w, h, cell } = list[at];
     fillWords(pass, at, number, now);
     pass.small.getContext("2d").putImageData(pass.image, 0, 0);
-    const isShown = picture && picture.complete && pass.eye !== null;
-    if (isShown) {
-      const half = picture.naturalWidth / 2;
-      ink.drawImage(picture, pass.eye * half, 0, half, picture.naturalHeight, x, y, w, h);
-    }
-    ink.globalAlpha = isShown ? 0.72 : 1;
+    ink.globalAlpha = isShown(pass) ? 0.72 : 1;
     ink.drawImage(pass.small, x, y, w, h);
     ink.globalAlpha = 1;
     ink.strokeStyle = inks.line;
@@ -103,8 +113,6 @@ const drawRun = (canvas, number) => {
       ink.stroke();
       ink.globalAlpha = 1;
     }
-    ink.fillStyle = inks.fg;
-    ink.fillText(pass.name, x, y - 5);
   });
   const centre = ({ pass, tile }) => {
     const { x, y, cell } = list[pass], columns = frame().passes[pass].tiles[0];

@@ -55,7 +55,10 @@ pub(crate) fn viewer(titles: &[&str], json: &str, animated: bool) -> Markup {
                 @for (number, title) in titles.iter().enumerate() {
                     figure {
                         figcaption #{ "view-name-" (number) } { (title) }
-                        canvas.map tabindex="0" role="img" aria-labelledby={ "view-name-" (number) } aria-describedby="view-keys" {}
+                        div.stack {
+                            canvas.still aria-hidden="true" {}
+                            canvas.map tabindex="0" role="img" aria-labelledby={ "view-name-" (number) } aria-describedby="view-keys" {}
+                        }
                         canvas.l2 role="img" aria-label={ "Lines in the L2 over the frame by eye, and lines fetched: " (title) } hidden[!animated] {}
                     }
                 }

@@ -283,7 +283,7 @@ impl<'a> ViewReport<'a> {
         let l2 = |run: &OfRun<'_>| {
             let content = run.l2.as_ref()?;
             Some(FrameL2 {
-                lines: content.lines.each_ref().map(|list| packed(list)),
+                lines: content.lines.each_ref().map(packed),
                 entered: packed(&content.entered),
             })
         };

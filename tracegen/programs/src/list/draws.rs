@@ -20,7 +20,7 @@ pub struct DrawRow {
     pub samples: u64,
     /// Number of textures that it can read.
     pub textures: usize,
-    /// Black where it covers no pixel and transparent where it covers one; `None` without records.
+    /// Opaque where it covers no pixel and transparent where it covers one; `None` without records.
     pub covered: Option<Thumbnail>,
 }
 

@@ -63,7 +63,7 @@ fn line(row: &PassRow, text: &mut String) {
     }
 }
 
-/// The draws: the pass's picture, dark where the draw covers no pixel.
+/// The draws: the pass's picture, grey where the draw covers no pixel.
 fn draws(row: &PassRow, text: &mut String) {
     let data = row.picture.as_ref().and_then(png).unwrap_or_default();
     let _ = write!(
@@ -75,10 +75,11 @@ fn draws(row: &PassRow, text: &mut String) {
     );
     for draw in &row.draw_rows {
         let covered = draw.covered.as_ref().and_then(|of| {
+            // Grey, which differs from black scenes as well as from bright ones.
             let alpha: Vec<u8> = of
                 .texels
                 .chunks_exact(4)
-                .flat_map(|of| [0, of[3]])
+                .flat_map(|of| [136, of[3]])
                 .collect();
             encoded(of.size, &alpha, ExtendedColorType::La8)
         });
@@ -89,7 +90,7 @@ fn draws(row: &PassRow, text: &mut String) {
         let shows = draw.shows.map_or("", |role| role.name());
         let _ = writeln!(
             text,
-            "<figure>{picture}<figcaption>{name} {shows}: {} fragments, {} samples, {} textures</figcaption></figure>",
+            "<figure>{picture}<figcaption>{name} {shows}: {} fragments, {} samples; textures: {}</figcaption></figure>",
             draw.fragments, draw.samples, draw.textures
         );
     }
@@ -171,7 +172,7 @@ mod tests {
         assert!(text.contains("shadow map") && text.contains("data:image/png;base64,iVBOR"));
         assert!(text.contains("alpha to coverage"));
         assert!(text.contains("alt=\"pixels of draw 0\""));
-        assert!(text.contains("draw 0 shadow map: 12 fragments, 0 samples, 1 textures"));
+        assert!(text.contains("draw 0 shadow map: 12 fragments, 0 samples; textures: 1"));
         let table = list.table();
         let lines: Vec<&str> = table.lines().collect();
         assert!(lines[0].starts_with("pass  shows"), "{table}");
