@@ -299,7 +299,7 @@ pub struct Timeline {
     /// Lines fetched by the L2, prefetches included, per interval of [`Self::INTERVAL_CYCLES`].
     pub fetched_lines: Vec<u32>,
     /// By frame, changes of the L2's content in the order of time; empty unless requested. What happens between two
-    /// frames is at the start of the later one.
+    /// frames is at the start of the later one. Frames after the first 2^24 changes have none.
     pub l2_changes: Vec<Vec<L2Change>>,
 }
 

@@ -69,7 +69,7 @@ impl MissPath {
                 || config.level.depend_on_evictions()
                 || config.records_l2(),
             fetched_lines: config.timeline.then(Vec::new),
-            changes: config.records_l2().then(Changes::default),
+            changes: config.records_l2().then(Changes::new),
         })
     }
 
@@ -119,11 +119,26 @@ impl MissPath {
 }
 
 /// The changes of finished frames, those after them, and those of one cache since the last request.
-#[derive(Default)]
 struct Changes {
     frames: Vec<Vec<L2Change>>,
     all: Vec<L2Change>,
     new: Vec<Change>,
+    /// Further changes to record. Frames after the one in which they run out have none, which limits memory.
+    left: usize,
+}
+
+impl Changes {
+    /// 256 MiB of them.
+    const MOST: usize = (256 << 20) / size_of::<L2Change>();
+
+    fn new() -> Self {
+        Self {
+            frames: Vec::new(),
+            all: Vec::new(),
+            new: Vec::new(),
+            left: Self::MOST,
+        }
+    }
 }
 
 /// A prefetcher and the state of its lines.
@@ -298,11 +313,14 @@ impl<D: DelayedFill> SecondLevel<D> {
     /// Records what has changed in the L2 up to the request at `now`.
     #[inline(never)]
     fn record(&mut self, now: u64) {
-        let Some(Changes { all, new, .. }) = &mut self.path.changes else {
+        let Some(Changes { all, new, left, .. }) = &mut self.path.changes else {
             return;
         };
         for cache in &mut self.level.caches {
             cache.take_changes(new);
+            if *left == 0 {
+                new.clear();
+            }
             all.extend(new.drain(..).map(|(line, is_there)| L2Change {
                 cycle: now,
                 line,
@@ -319,8 +337,11 @@ impl<D: DelayedFill> SecondLevel<D> {
             }
             self.record(now);
         }
-        if let Some(Changes { frames, all, .. }) = &mut self.path.changes {
-            frames.push(std::mem::take(all));
+        if let Some(changes) = &mut self.path.changes
+            && changes.left > 0
+        {
+            changes.left = changes.left.saturating_sub(changes.all.len());
+            changes.frames.push(std::mem::take(&mut changes.all));
         }
     }
 
