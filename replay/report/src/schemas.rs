@@ -52,7 +52,13 @@ fn row(headings: &[Heading]) -> Value {
             }
         }
     }
-    let required: Vec<&String> = properties.keys().collect();
+    let required: Vec<String> = properties.keys().cloned().collect();
+    let about =
+        "Members of the row with their lowest and highest value, and the reason of the difference.";
+    properties.insert(
+        "figures".to_owned(),
+        json!({ "type": "object", "description": about }),
+    );
     json!({ "type": "object", "required": required, "properties": properties })
 }
 
