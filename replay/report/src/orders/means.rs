@@ -88,7 +88,7 @@ impl<'a> Mean<'a> {
     pub fn over_morton(&self) -> Option<Figure> {
         let ratio = |[own, morton]: [f64; 2]| own / morton;
         let of_rows =
-            |[own, morton]: [&OrderRow<'_>; 2]| Some([own.ratio()?, morton.ratio()?]).map(ratio);
+            |[own, morton]: [&OrderRow<'_>; 2]| Some(ratio([own.ratio()?, morton.ratio()?]));
         let value = geometric(self.beside_morton().filter_map(of_rows)).map(change_pct)?;
         let corners = self.beside_morton().map(|rows| {
             let [own, morton] = rows.map(|row| row.corners.as_ref());
