@@ -57,7 +57,7 @@ fn row(headings: &[Heading]) -> Value {
         "Members of the row with their lowest and highest value, and the reason of the difference.";
     properties.insert(
         "figures".to_owned(),
-        json!({ "type": "object", "description": about }),
+        json!({ "type": "object", "additionalProperties": true, "description": about }),
     );
     json!({ "type": "object", "required": required, "properties": properties })
 }
