@@ -215,8 +215,21 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], over: &str) -> Vec<Str
         orders.iter().filter(of)
     };
     let best = |buildable: bool| others(buildable).min_by(|a, b| against(a).total_cmp(&against(b)));
+    let lows = others(true).filter_map(|o| Some((o.name.as_str(), o.range_pct?[0])));
+    let saves_over_ranges = lows
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, low)| rounded(*low) < 0.0);
     let mut out = Vec::new();
     match best(true) {
+        Some(_)
+            if others(true).all(|o| rounded(against(o)) == 0.0) && saves_over_ranges.is_some() =>
+        {
+            let (order, low) = saves_over_ranges.unwrap_or_default();
+            out.push(format!(
+                "All orders read as much from memory as {reference} here; {order} reads up to {:.1} % less in the best case ({over}).",
+                -low
+            ));
+        }
         Some(_) if others(true).all(|o| rounded(against(o)) == 0.0) => out.push(format!(
             "No order can save here: {} as much from memory as {reference} ({over}).",
             match others(true).count() {

@@ -37,7 +37,8 @@ pub struct Corners {
     pub configs: Vec<RunConfig>,
     /// The ranges in words.
     pub over: String,
-    /// Replays there only the baseline, Morton and this many of the best orders; `None`: all orders.
+    /// Replays there only the baseline, Morton, zig-zag+sta+offset and this many of the best other orders; `None`: all
+    /// orders.
     pub finalists: Option<usize>,
 }
 
@@ -169,14 +170,16 @@ impl OrdersStudy {
     /// Number of replays of each trace.
     pub fn replays_per_trace(&self) -> usize {
         let corners = self.corners.as_ref().map_or(0, |corners| {
-            let finalists = corners.finalists.map_or(usize::MAX, |best| best + 2);
+            let finalists = corners.finalists.map_or(usize::MAX, |best| best + 3);
             corners.configs.len() * self.orders.len().min(finalists)
         });
         self.between.len() * (self.caches_bytes.len() * self.orders.len() + corners)
     }
 
-    /// The baseline, Morton, and the buildable orders with the fewest bytes over all traces and caches.
+    /// Three fixed orders, and the other buildable ones with the fewest bytes over all traces and caches. Where the
+    /// values of the machine leave nothing to save, the fixed ones show whether the ranges do.
     fn finalists(&self, of_traces: &[Vec<OrderRow<'_>>], best: usize) -> Vec<Order> {
+        let fixed = [BASELINE, Order::MORTON, self.start()];
         let score = |order: Order| {
             let rows = of_traces.iter().flatten();
             let own = rows.filter(|row| row.config.order == order && row.is_buildable());
@@ -186,13 +189,12 @@ impl OrdersStudy {
             (!bytes.is_empty()).then(|| bytes.iter().sum::<f64>())
         };
         let mut ranked: Vec<(f64, Order)> = (self.orders.iter())
-            .filter(|order| ![BASELINE, Order::MORTON].contains(order))
+            .filter(|order| !fixed.contains(order))
             .filter_map(|&order| Some((score(order)?, order)))
             .collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = ranked.into_iter().take(best).map(|(_, order)| order);
-        let fixed = [BASELINE, Order::MORTON].into_iter();
-        fixed
+        (fixed.into_iter())
             .filter(|order| self.orders.contains(order))
             .chain(best)
             .collect()
