@@ -11,6 +11,7 @@ use crate::plots::hbars::HBarChart;
 use crate::plots::paths::{PathPlot, stops};
 use crate::table::Table;
 use maud::{Markup, html};
+use sim::config::Order;
 use sim::order::{PlanInputs, View, WorkItem};
 use studies::orders_study::{BASELINE, OrderRow, RowKind};
 
@@ -49,7 +50,7 @@ impl OrdersReport<'_> {
         );
         let about = html! {
             p {
-                "Bytes between the L2 and memory in each tile order, against those of " code { (BASELINE.name()) }
+                "Bytes between the L2 and memory in each tile order; the tables compare them with those of " code { (BASELINE.name()) }
                 " with the same caches: geometric means over traces and caches. Bounds and searched orders know the frame's accesses in advance; no hardware can have them. "
                 "The JSON file beside this page has every figure, the CSV file every row."
             }
@@ -128,10 +129,16 @@ pub(super) fn sentences(means: &[Mean<'_>]) -> Vec<String> {
     answers::studied(BASELINE.name(), &orders.collect::<Vec<_>>(), &over)
 }
 
-/// Bytes of every order and bound relative to the baseline.
+/// Bytes of every order and bound relative to Morton, or to the baseline if Morton was not replayed.
 fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
+    let has_morton = first_of(means).any(|mean| mean.over_morton().is_some());
+    let reference = [BASELINE, Order::MORTON][usize::from(has_morton)];
     let row = |mean: &Mean<'_>| {
-        let value = mean.change_pct().map(|change| 100.0 + change);
+        let change = match has_morton {
+            true => mean.over_morton().map(|of| of.value),
+            false => mean.change_pct(),
+        };
+        let value = change.map(|change| 100.0 + change);
         let values = if is_buildable(mean) {
             vec![value, None]
         } else {
@@ -141,7 +148,7 @@ fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
     };
     HBarChart {
         title: "Bytes from memory by order".to_owned(),
-        value_label: format!("% of the bytes of {}", BASELINE.name()),
+        value_label: format!("% of the bytes of {}", reference.name()),
         series: SeriesStyle::list(&[
             ("hardware can follow it", 2),
             ("needs the future, or a bound", 7),
