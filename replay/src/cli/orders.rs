@@ -28,7 +28,8 @@ const CACHES: &str = "8/128,16/128,8/256,16/256";
 /// The machine without `--preset`, `--config` and `--caches`: a present headset's.
 const PRESET: Preset = Preset::ADRENO_740;
 
-/// Orders that are replayed over the ranges of a machine, besides the baseline and Morton, if none are listed.
+/// Number of best orders that are replayed over the ranges of a machine if no orders are listed, besides three fixed
+/// ones.
 const FINALISTS: usize = 3;
 
 /// Stands for the orders that the study knows: every curve and every part.

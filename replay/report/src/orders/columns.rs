@@ -8,7 +8,8 @@ use studies::orders_study::learn::{Learned, Learner};
 use studies::orders_study::{OrderRow, RowKind};
 
 /// Keys of the means' changes and rates.
-pub(super) const CHANGES: [&str; 7] = [
+pub(super) const CHANGES: [&str; 8] = [
+    "over_morton_pct",
     "change_pct",
     "worst_trace",
     "worst_trace_change_pct",

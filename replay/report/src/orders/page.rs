@@ -50,7 +50,7 @@ impl OrdersReport<'_> {
         );
         let about = html! {
             p {
-                "Bytes between the L2 and memory in each tile order; the tables compare them with those of " code { (BASELINE.name()) }
+                "Bytes between the L2 and memory in each tile order; the tables compare them with those of Morton order and of " code { (BASELINE.name()) }
                 " with the same caches: geometric means over traces and caches. Bounds and searched orders know the frame's accesses in advance; no hardware can have them. "
                 "The JSON file beside this page has every figure, the CSV file every row."
             }
