@@ -116,7 +116,7 @@ impl PendingLines {
             let depths = self.l2_depths.iter().copied();
             tally.count(&self.missed, depths.clone());
             if tree < last && tally.is_modulo {
-                // A line on top with fewer sets is on top with more sets.
+                // A line on top with fewer sets is on top with more sets. Not so with hashed sets, which come first.
                 retain(&mut self.missed, depths, 1);
             }
         }
