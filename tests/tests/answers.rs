@@ -94,7 +94,7 @@ fn details_add_tables_and_change_no_line() {
 fn the_condition_begins_in_the_first_three_lines() {
     for (command, folder) in commands() {
         let text = text(command, &folder);
-        let conditions = ["Machine: ", "Measured at ", "Clients of memory: ", "frames"];
+        let conditions = ["Machine: ", "Measured at ", "frames"];
         let at = text
             .lines()
             .position(|line| conditions.iter().any(|of| line.contains(of)));

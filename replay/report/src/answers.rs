@@ -2,7 +2,9 @@
 
 mod replays;
 
-pub use replays::{MACHINE, Sampled, Scheme, Traffic, machine, replayed, sampled, schemes};
+pub use replays::{
+    MACHINE, Sampled, Scheme, Traffic, hardware, machine, replayed, sampled, schemes,
+};
 
 use super::html::{change, count, list};
 use super::lists::{geometric_mean, mean};

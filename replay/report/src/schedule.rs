@@ -1,5 +1,6 @@
 //! Frame time by scheduler (`replay.schedule/1`).
 
+use super::answers;
 use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::lists::{geometric_mean, unique};
@@ -246,7 +247,11 @@ impl Document for ScheduleReport {
         vec![
             self.fastest(),
             format!(
-                "Clients of memory: textures and colour. Figures are means of a frame; faster than the first row [for {OVER}]."
+                "{}; clients of memory are textures and colour. Figures are means of a frame; faster than the first row [for {OVER}].",
+                answers::hardware(
+                    &self.config,
+                    [[self.config.level.l1, self.config.level.l2].map(|cache| cache.size_bytes)]
+                )
             ),
         ]
     }

@@ -195,6 +195,36 @@ macro_rules! choices {
     };
 }
 
+/// Implements [`Row`] for a type with the fields `name` and `help` from its rows as [`Named`].
+#[macro_export]
+macro_rules! rows {
+    ($row:ty $(, other = $other:path)?: $($named:expr $(, if $only:meta)*;)+) => {
+        impl $crate::registry::Row for $row {
+            fn name(&self) -> &'static str {
+                self.name
+            }
+
+            fn help(&self) -> &'static str {
+                self.help
+            }
+
+            fn table() -> &'static [$crate::registry::Named<Self>] {
+                const TABLE: &[$crate::registry::Named<$row>] = &[$($(#[$only])* $named),+];
+                TABLE
+            }
+
+            fn names() -> &'static [&'static str] {
+                const NAMES: &[&str] = &[$($(#[$only])* $named.row().name),+];
+                NAMES
+            }
+
+            $(fn other(name: &str) -> Result<$crate::registry::Named<Self>, Option<String>> {
+                $other(name)
+            })?
+        }
+    };
+}
+
 /// Implements [`Row`] for a type with the fields `name` and `help`, and defines one constant per row.
 /// `other = FUNCTION` gives the meaning of names that are not in the table.
 macro_rules! registry {
@@ -207,31 +237,7 @@ macro_rules! registry {
             )+
         }
 
-        impl $crate::registry::Row for $row {
-            fn name(&self) -> &'static str {
-                self.name
-            }
-
-            fn help(&self) -> &'static str {
-                self.help
-            }
-
-            fn table() -> &'static [$crate::registry::Named<Self>] {
-                const TABLE: &[$crate::registry::Named<$row>] =
-                    &[$($(#[$only])* <$crate::registry::Named<$row>>::$id),+];
-                TABLE
-            }
-
-            fn names() -> &'static [&'static str] {
-                const NAMES: &[&str] =
-                    &[$($(#[$only])* <$crate::registry::Named<$row>>::$id.row().name),+];
-                NAMES
-            }
-
-            $(fn other(name: &str) -> Result<$crate::registry::Named<Self>, Option<String>> {
-                $other(name)
-            })?
-        }
+        $crate::rows! { $row $(, other = $other)?: $(<$crate::registry::Named<$row>>::$id $(, if $only)*;)+ }
     };
 }
 pub(crate) use registry;

@@ -103,7 +103,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let study = study(args)?;
     let prints = check_outputs(args)?;
     let traces = Traces::open(&args.traces)?;
-    let opened = traces.subjects_by_file();
+    let opened = traces.subjects();
     let subjects = Subjects {
         traces: &opened,
         files: order_files(
@@ -300,7 +300,7 @@ fn learned<'a>(
                 bail!("--learn: expected LRU caches of 4 ways, which the learner counts");
             };
             learned.push(LearnedTrace {
-                label: &subject.label,
+                file: &subject.id.name,
                 config,
                 learned: found,
             });

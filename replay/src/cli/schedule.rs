@@ -179,7 +179,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let outputs = args.outputs.list::<ScheduleReport>()?;
     let prints = files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
     let traces = Traces::open(&args.traces)?;
-    let subjects = traces.subjects_by_file();
+    let subjects = traces.subjects();
     let of_frames = subjects
         .iter()
         .map(|of| u64::from(frame_count(of.source.tables())));

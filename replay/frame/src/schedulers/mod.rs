@@ -15,7 +15,7 @@ mod z2_sta;
 
 use sim::config::{Order, RunConfig};
 use sim::order::{TileRef, WorkItem};
-use sim::registry::{Named, Row};
+use sim::registry::Named;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -47,32 +47,13 @@ pub type Scheduler = Named<SchedulerRow>;
 
 macro_rules! table {
     ($($row:ident)+) => {
-        const TABLE: &[Scheduler] = &[$(Scheduler::new(&$row::ROW)),+];
-        const NAMES: &[&str] = &[$($row::ROW.name),+];
+        sim::rows! { SchedulerRow: $(Scheduler::new(&$row::ROW);)+ }
     };
 }
 
 table! {
     first_idle static_turns boustro z2_lrta z2_sta quads_in_turn quads_grouped hot_cold priority_warps skip_equal
     pair_pressure
-}
-
-impl Row for SchedulerRow {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn help(&self) -> &'static str {
-        self.help
-    }
-
-    fn table() -> &'static [Named<Self>] {
-        TABLE
-    }
-
-    fn names() -> &'static [&'static str] {
-        NAMES
-    }
 }
 
 /// What a scheduler's hardware depends on.

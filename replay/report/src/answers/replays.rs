@@ -71,6 +71,17 @@ pub fn machine(
     caches_bytes: impl IntoIterator<Item = [u64; 2]>,
     frames: &[u32],
 ) -> String {
+    let all = count(frames.iter().sum::<u32>() as usize, "frame");
+    let of = match frames.len() {
+        1 => all,
+        traces => format!("{} with {all}", count(traces, "trace")),
+    };
+    let hardware = hardware(config, caches_bytes);
+    format!("{hardware}, {} mode; {of}.", config.mode_name())
+}
+
+/// The beginning of [`machine`]: caches and cores, and the preset's name if it is one.
+pub fn hardware(config: &RunConfig, caches_bytes: impl IntoIterator<Item = [u64; 2]>) -> String {
     let caches = match unique(caches_bytes).as_slice() {
         [[l1, l2]] => format!("L1 {}, L2 {}", format_bytes(*l1), format_bytes(*l2)),
         several => {
@@ -80,11 +91,6 @@ pub fn machine(
                 .map(|[l1, l2]| format!("{}/{}", kib(*l1), kib(*l2)));
             format!("L1/L2 {} KiB", pairs.collect::<Vec<_>>().join(", "))
         }
-    };
-    let all = count(frames.iter().sum::<u32>() as usize, "frame");
-    let of = match frames.len() {
-        1 => all,
-        traces => format!("{} with {all}", count(traces, "trace")),
     };
     // DRAM changes none of the figures that stand beside this sentence.
     let without_dram = |config: RunConfig| RunConfig {
@@ -98,12 +104,11 @@ pub fn machine(
         .find(is_config)
         .map(|preset| format!("{}, ", preset.name()));
     format!(
-        "{MACHINE}{}{}; {}-byte lines, {}, {} mode; {of}.",
+        "{MACHINE}{}{}; {}-byte lines, {}",
         name.unwrap_or_default(),
         caches,
         config.line_bytes,
-        count(config.cores as usize, "core"),
-        config.mode_name()
+        count(config.cores as usize, "core")
     )
 }
 

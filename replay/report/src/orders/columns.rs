@@ -63,7 +63,7 @@ fn part(row: &OrderRow<'_>, of: fn(Order) -> String) -> Option<String> {
 #[rustfmt::skip]
 pub fn rows<'a>() -> Vec<Column<'a, OrderRow<'a>>> {
     columns_of::<OrderRow<'a>>()
-        .text("trace", "trace", |r| r.subject.label.clone())
+        .text("trace", "trace", |r| r.subject.id.name.clone())
         .text("camera", "camera", |r| r.subject.id.camera.clone())
         .text("display", "display", |r| r.subject.id.display.clone())
         .real("offset_tiles", "offset", "tiles", 0, |r| f64::from(r.offset_tiles)).about("columns of tiles by which infinity lies apart in the two pictures")
@@ -152,8 +152,8 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
 
 /// The results of the learner for a trace and a pair of caches.
 pub struct LearnedTrace<'a> {
-    /// The trace.
-    pub label: &'a str,
+    /// The trace's file.
+    pub file: &'a str,
     /// The configuration.
     pub config: sim::config::RunConfig,
     /// The results.
@@ -191,7 +191,7 @@ impl LearnedRow<'_> {
 #[rustfmt::skip]
 pub fn learned<'a>() -> Vec<Column<'a, LearnedRow<'a>>> {
     columns_of::<LearnedRow<'a>>()
-        .text("trace", "trace", |r| r.of.label)
+        .text("trace", "trace", |r| r.of.file)
         .real("l1_kib", "L1", "KiB", 0, |r| kib(r.of.config.level.l1.size_bytes))
         .real("l2_kib", "L2", "KiB", 0, |r| kib(r.of.config.level.l2.size_bytes))
         .text("between_frames", "between frames", |r| r.of.config.between_frames.to_string())

@@ -77,18 +77,27 @@ const fillWords = (pass, at, number, now) => {
       : ramp[Math.min(255, 255 * shown[tile] / most | 0)];
   }
 };
-// What stays the same lies below the tiles, on a canvas of its own: the picture and the names.
+// What stays the same is drawn once: picture and names below the tiles, the grid above them.
 const isShown = pass => picture && picture.complete && pass.eye !== null;
 const drawStill = (canvas, { list, height }) => {
   const key = [canvas.clientWidth, state.frame, inks.fg, devicePixelRatio, isShown(frame().passes[0])].join();
   if (canvas.key === key) return;
   canvas.key = key;
-  const ink = fit(canvas, height);
+  const ink = fit(canvas, height), grid = fit(canvas.parentNode.lastChild, height);
+  grid.strokeStyle = inks.line;
   frame().passes.forEach((pass, at) => {
-    const { x, y, w, h } = list[at], half = isShown(pass) && picture.naturalWidth / 2;
+    const { x, y, w, h, cell } = list[at], half = isShown(pass) && picture.naturalWidth / 2;
     if (half) ink.drawImage(picture, pass.eye * half, 0, half, picture.naturalHeight, x, y, w, h);
     ink.fillStyle = inks.fg;
     ink.fillText(pass.name, x, y - 5);
+    grid.globalAlpha = 1;
+    grid.strokeRect(x, y, w, h);
+    if (cell < 7) return;
+    grid.globalAlpha = 0.25;
+    grid.beginPath();
+    for (let column = 1; column < pass.tiles[0]; column++) grid.rect(x + column * cell, y, 0, h);
+    for (let row = 1; row < pass.tiles[1]; row++) grid.rect(x, y + row * cell, w, 0);
+    grid.stroke();
   });
 };
 const drawRun = (canvas, number) => {
@@ -97,22 +106,12 @@ const drawRun = (canvas, number) => {
   const ink = fit(canvas, height), run = frame().runs[number], now = clock(run);
   ink.imageSmoothingEnabled = false;
   frame().passes.forEach((pass, at) => {
-    const { x, y, w, h, cell } = list[at];
+    const { x, y, w, h } = list[at];
     fillWords(pass, at, number, now);
     pass.small.getContext("2d").putImageData(pass.image, 0, 0);
     ink.globalAlpha = isShown(pass) ? 0.72 : 1;
     ink.drawImage(pass.small, x, y, w, h);
     ink.globalAlpha = 1;
-    ink.strokeStyle = inks.line;
-    ink.strokeRect(x, y, w, h);
-    if (cell >= 7) {
-      ink.beginPath();
-      for (let column = 1; column < pass.tiles[0]; column++) ink.rect(x + column * cell, y, 0, h);
-      for (let row = 1; row < pass.tiles[1]; row++) ink.rect(x, y + row * cell, w, 0);
-      ink.globalAlpha = 0.25;
-      ink.stroke();
-      ink.globalAlpha = 1;
-    }
   });
   const centre = ({ pass, tile }) => {
     const { x, y, cell } = list[pass], columns = frame().passes[pass].tiles[0];

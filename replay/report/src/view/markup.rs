@@ -58,6 +58,7 @@ pub(crate) fn viewer(titles: &[&str], json: &str, animated: bool) -> Markup {
                         div.stack {
                             canvas.still aria-hidden="true" {}
                             canvas.map tabindex="0" role="img" aria-labelledby={ "view-name-" (number) } aria-describedby="view-keys" {}
+                            canvas.grid aria-hidden="true" {}
                         }
                         canvas.l2 role="img" aria-label={ "Lines in the L2 over the frame by eye, and lines fetched: " (title) } hidden[!animated] {}
                     }

@@ -8,7 +8,7 @@ use formats::raytrace::RaytraceTables;
 use sim::config::Order;
 use sim::order::TileRef;
 use sim::order::rays::RayPlan;
-use sim::registry::{Named, Row};
+use sim::registry::Named;
 
 /// A row of the table of rules.
 #[derive(Debug)]
@@ -26,25 +26,7 @@ pub struct RuleRow {
 /// A rule.
 pub type OrderRule = Named<RuleRow>;
 
-const TABLE: &[OrderRule] = &[OrderRule::new(&sampled::ROW)];
-
-impl Row for RuleRow {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn help(&self) -> &'static str {
-        self.help
-    }
-
-    fn table() -> &'static [Named<Self>] {
-        TABLE
-    }
-
-    fn names() -> &'static [&'static str] {
-        &[sampled::ROW.name]
-    }
-}
+sim::rows! { RuleRow: OrderRule::new(&sampled::ROW); }
 
 /// The last frame, and the machine.
 pub struct LastFrame<'a> {

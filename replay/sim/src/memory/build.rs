@@ -5,7 +5,6 @@ use super::policy::{AnyCache, Geometry, boxed};
 use super::recorded::Recorded;
 use super::sectored::Sectored;
 use super::victim::WithVictimCache;
-use super::watched::Watched;
 use crate::config::{ConfigError, LevelConfig, SetIndex};
 
 impl AnyCache {
@@ -39,13 +38,13 @@ impl AnyCache {
 
     /// Wraps the cache so that it records the lines it evicts.
     #[must_use]
-    pub(super) fn watched(self) -> Self {
-        boxed(Watched::new(self.into_box()))
+    pub(super) fn recording_evictions(self) -> Self {
+        boxed(Recorded::evictions(self.into_box()))
     }
 
     /// Wraps the cache so that it records the changes of its content.
     #[must_use]
-    pub(super) fn recorded(self) -> Self {
-        boxed(Recorded::new(self.into_box()))
+    pub(super) fn recording_changes(self) -> Self {
+        boxed(Recorded::changes(self.into_box()))
     }
 }

@@ -29,7 +29,6 @@ mod sectored;
 mod server;
 mod simple_memory;
 mod victim;
-mod watched;
 
 pub use access::{Access, Client};
 pub use cache::{Cache, EMPTY};

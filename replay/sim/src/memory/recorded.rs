@@ -1,21 +1,40 @@
-//! A cache that records which lines enter and leave it, to show its content over time.
+//! A cache that records which lines enter and leave it: the lines it evicts, for levels that depend on them, or all
+//! changes, to show its content over time.
 
 use super::cache::{Cache, EMPTY};
 
 /// A line, and whether it is in the cache from now on. [`EMPTY`] stands for all lines of the cache.
 pub type Change = (u32, bool);
 
-/// A cache and its changes since they were last taken. It must report its evictions, which a sectored cache does not.
+/// A cache, and what happened since it was last taken.
 pub(super) struct Recorded {
     cache: Box<dyn Cache>,
-    changes: Vec<Change>,
+    evicted: Option<Vec<u32>>,
+    changes: Option<Vec<Change>>,
 }
 
 impl Recorded {
-    pub(super) fn new(cache: Box<dyn Cache>) -> Self {
+    /// Records evictions.
+    pub(super) fn evictions(cache: Box<dyn Cache>) -> Self {
         Self {
             cache,
-            changes: Vec::new(),
+            evicted: Some(Vec::new()),
+            changes: None,
+        }
+    }
+
+    /// Records all changes of a cache that reports its evictions, which a sectored cache does not.
+    pub(super) fn changes(cache: Box<dyn Cache>) -> Self {
+        Self {
+            cache,
+            evicted: None,
+            changes: Some(Vec::new()),
+        }
+    }
+
+    fn change(&mut self, line: u32, is_in: bool) {
+        if let Some(changes) = &mut self.changes {
+            changes.push((line, is_in));
         }
     }
 }
@@ -32,10 +51,13 @@ impl Cache for Recorded {
     fn fill(&mut self, line: u32) -> u32 {
         let evicted = self.cache.fill(line);
         if evicted != EMPTY {
-            self.changes.push((evicted, false));
+            self.change(evicted, false);
+            if let Some(lines) = &mut self.evicted {
+                lines.push(evicted);
+            }
         }
         if evicted != line {
-            self.changes.push((line, true));
+            self.change(line, true);
         }
         evicted
     }
@@ -43,21 +65,29 @@ impl Cache for Recorded {
     fn remove(&mut self, line: u32) -> bool {
         let was_there = self.cache.remove(line);
         if was_there {
-            self.changes.push((line, false));
+            self.change(line, false);
         }
         was_there
     }
 
     fn take_evicted(&mut self, lines: &mut Vec<u32>) {
-        self.cache.take_evicted(lines);
+        match &mut self.evicted {
+            Some(evicted) => lines.append(evicted),
+            None => self.cache.take_evicted(lines),
+        }
     }
 
     fn take_changes(&mut self, changes: &mut Vec<Change>) {
-        changes.append(&mut self.changes);
+        if let Some(own) = &mut self.changes {
+            changes.append(own);
+        }
     }
 
     fn clear(&mut self) {
         self.cache.clear();
-        self.changes.push((EMPTY, false));
+        self.change(EMPTY, false);
+        if let Some(lines) = &mut self.evicted {
+            lines.clear();
+        }
     }
 }

@@ -301,7 +301,12 @@ impl OrdersStudy {
                     .search(method, size, &subject.id.checksum)
                     .map_err(fail)?;
                 Ok(Searched {
-                    source: format!("{}.{}.{}k.order", subject.label, method.name(), size >> 10),
+                    source: format!(
+                        "{}.{}.{}k.order",
+                        subject.id.name,
+                        method.name(),
+                        size >> 10
+                    ),
                     file,
                 })
             });

@@ -48,10 +48,10 @@ impl Caches<AnyCache> {
         let second = |core| build(l2, "L2", if core == 0 { 0 } else { config.cores + core });
         let observed = |mut l2: AnyCache| {
             if config.level.depend_on_evictions() {
-                l2 = l2.watched();
+                l2 = l2.recording_evictions();
             }
             match config.records_l2() {
-                true => l2.recorded(),
+                true => l2.recording_changes(),
                 false => l2,
             }
         };
