@@ -237,7 +237,7 @@ macro_rules! registry {
             )+
         }
 
-        $crate::rows! { $row $(, other = $other)?: $(<$crate::registry::Named<$row>>::$id $(, if $only)*;)+ }
+        $crate::registry::rows! { $row $(, other = $other)?: $(<$crate::registry::Named<$row>>::$id $(, if $only)*;)+ }
     };
 }
-pub(crate) use registry;
+pub(crate) use {registry, rows};

@@ -66,6 +66,8 @@ pub struct Drained {
     pub textures: usize,
     /// Counts of the records.
     pub counts: CaptureCounts,
+    /// Fragments of the left and of the right eye; 0 for programs with one picture.
+    pub eye_fragments: [u64; 2],
     /// How the capture was divided, and which texture reads it lacks.
     pub program: ProgramCapture,
 }
@@ -162,6 +164,7 @@ pub fn drain<W: Write + Seek>(
         builder.count_ignored(session, &frame.draws, &views, &weights);
     }
     drained.counts = builder.counts;
+    drained.eye_fragments = builder.eye_fragments;
     if drained.counts.quads == 0 {
         return Err(DrainError::Nothing);
     }

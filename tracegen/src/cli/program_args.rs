@@ -253,7 +253,22 @@ fn report(session: &Session, drained: &Drained, bytes: u64) {
     for notice in drained.program.notices() {
         note(&notice);
     }
+    if let Some((of, fragments)) = empty_eye(drained.eye_fragments) {
+        warn(&format!(
+            "the {of} eye has no fragments, the other one has {fragments}; `--list-page` shows its passes. Mesa 22.3 drops triangles that \
+             cross a clip edge in the second view of a multiview pass"
+        ));
+    }
     note(&format!("driver: {}", session.driver));
+}
+
+/// The eye without fragments, and those of the other eye.
+fn empty_eye(fragments: [u64; 2]) -> Option<(&'static str, u64)> {
+    match fragments {
+        [0, other] if other > 0 => Some(("left", other)),
+        [other, 0] if other > 0 => Some(("right", other)),
+        _ => None,
+    }
 }
 
 fn report_check(checked: &Check) -> ExitCode {

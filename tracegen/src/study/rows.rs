@@ -262,7 +262,7 @@ const COMBINATIONS: &[(&str, &str)] = &[
         "superfrustum+occlusion+multiview+hidden-area-mask",
     ),
     (
-        "Lossless but for 1 px in the distance",
+        "Lossless, except for shifts of up to 1 px in the far field",
         "superfrustum+occlusion+multiview+hidden-area-mask+far-field",
     ),
     (

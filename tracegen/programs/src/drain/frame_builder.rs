@@ -76,6 +76,8 @@ const DIVIDED: &str = "fragments of quads that sample at more than 15 coordinate
 pub struct Builder<W: Write + Seek> {
     recorder: Recorder<W>,
     pub counts: CaptureCounts,
+    /// Fragments of the left and of the right eye.
+    pub eye_fragments: [u64; 2],
     textures: ImageTextures,
     next_primitive: u32,
     /// Numbers of the program's pipelines, from 1 in the order in which the trace uses them. The program's own
@@ -92,6 +94,7 @@ impl<W: Write + Seek> Builder<W> {
         Self {
             recorder,
             counts: CaptureCounts::default(),
+            eye_fragments: [0; 2],
             textures: ImageTextures::default(),
             next_primitive: 0,
             pipelines: HashMap::new(),
@@ -220,7 +223,11 @@ impl<W: Write + Seek> Builder<W> {
                 quads: &of.quads,
                 depths: &of.depths,
             })?;
-            self.counts += self.recorder.end_pass()?.counts;
+            let counts = self.recorder.end_pass()?.counts;
+            if let Some(eye) = eye {
+                self.eye_fragments[eye as usize] += counts.fragments;
+            }
+            self.counts += counts;
         }
         Ok(triangles)
     }
