@@ -3,8 +3,10 @@
 use super::outputs::Output;
 use formats::container::is_stdout;
 use formats::text::printable_lines;
+use std::collections::BTreeSet;
 use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Exit code of wrong use or unreadable input, also used by clap.
 pub(crate) const USAGE: u8 = 2;
@@ -12,12 +14,16 @@ pub(crate) const USAGE: u8 = 2;
 /// `--quiet`, set once before the command starts.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Set by the first warning.
-static WARNED: AtomicBool = AtomicBool::new(false);
+/// The warnings so far.
+static WARNED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+fn warned() -> MutexGuard<'static, BTreeSet<String>> {
+    WARNED.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// True if the program has warned.
 pub fn has_warned() -> bool {
-    WARNED.load(Ordering::Relaxed)
+    !warned().is_empty()
 }
 
 pub(crate) fn set_quiet(quiet: bool) {
@@ -88,9 +94,11 @@ pub fn note(message: &str) {
     }
 }
 
-/// Prints a warning on stderr; the command continues.
+/// Prints a warning on stderr, the same one once; the command continues.
 pub fn warn(message: &str) {
-    WARNED.store(true, Ordering::Relaxed);
+    if !warned().insert(message.to_owned()) {
+        return;
+    }
     print_message("\u{1b}[1;33mwarning\u{1b}[0m: ", message);
 }
 
