@@ -269,6 +269,9 @@ fn details(entries: &[Entry], style: Style) -> String {
     if let Some(table) = cycle_table::units(entries) {
         part(cycle_table::TITLE, table.styled(style));
     }
+    if let Some(table) = cycle_table::prefetches(entries) {
+        part(cycle_table::PREFETCH_TITLE, table.styled(style));
+    }
     out.0.trim_end().to_owned() + "\n" + &errors::text(Of::Rays, style)
 }
 
@@ -308,6 +311,7 @@ fn hardware(entries: &[Entry]) -> Markup {
     html! {
         (tables::work(entries).markup())
         @if let Some(table) = cycle_table::units(entries) { (table.markup()) }
+        @if let Some(table) = cycle_table::prefetches(entries) { (table.markup()) }
         (tables::traffic(entries).markup())
         (tables::energy(entries).markup())
     }

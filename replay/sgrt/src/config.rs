@@ -1,5 +1,6 @@
 //! The parameters of the model, read from TOML. `data/sgrt-default.toml` documents the defaults.
 
+use super::prefetch::RayPrefetching;
 use formats::raytrace::TraversalKind;
 use serde::{Deserialize, Serialize};
 
@@ -194,6 +195,31 @@ pub struct Cycles {
     /// True if a unit returns its rays in order of dispatch; a finished ray then keeps its slot until all earlier ones
     /// have returned.
     pub in_order_return: bool,
+    /// What is fetched ahead into the node and triangle caches.
+    #[serde(default, skip_serializing_if = "Prefetch::is_none")]
+    pub prefetch: Prefetch,
+}
+
+/// Prefetching into the node and triangle caches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Prefetch {
+    /// The prefetcher.
+    pub prefetcher: RayPrefetching,
+    /// Most bytes of a treelet, its root included; for `treelet`.
+    pub treelet_bytes: u32,
+    /// Entries that are fetched at a pop; for `ttp`.
+    pub stack_entries: u32,
+    /// True if a ray also visits popped entries that lie behind its nearest triangle so far.
+    pub visits_dropped: bool,
+}
+
+impl Prefetch {
+    /// True if nothing is fetched ahead.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Energy per operation and per byte.
@@ -307,6 +333,14 @@ impl SgrtConfig {
                 });
             }
         }
+        let has_prefetcher = self.cycles.prefetch.prefetcher != Prefetch::default().prefetcher;
+        if has_prefetcher && self.cycles.warp_rays > 1 {
+            return Err(ConfigError::Range {
+                key: "cycles.warp_rays".to_owned(),
+                expected: "1 with a prefetcher, which follows the stacks of single rays",
+                found: self.cycles.warp_rays.to_string(),
+            });
+        }
         let c = &self.cache;
         for (key, bytes, ways) in [
             ("cache.node_l1_bytes", c.node_l1_bytes, c.l1_ways),
@@ -408,6 +442,22 @@ mod tests {
         assert_eq!(config.tni.units, 8);
         assert_eq!(config.tni.clock_mhz, 700.0);
         assert_eq!(config.srp, SgrtConfig::default().srp);
+    }
+
+    #[test]
+    fn without_a_prefetcher_a_configuration_does_not_name_one() {
+        let config = SgrtConfig::default();
+        assert_eq!(config.cycles.prefetch, Prefetch::default());
+        let text = toml::to_string(&config).expect("TOML");
+        assert!(!text.contains("prefetch"));
+        assert_eq!(SgrtConfig::from_overrides(&text).expect("valid"), config);
+        let text = "[cycles]\nwarp_rays = 8\n[cycles.prefetch]\nprefetcher = 'ttp'";
+        let error = SgrtConfig::from_overrides(text).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("cycles.warp_rays: expected 1")
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::work::PixelWork;
 use formats::raytrace::camera::sample_position_px;
-use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::raytrace::{Hierarchy, RayTile, Raytrace, RaytraceTables};
 use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
 use sim::sums::Unbalanced;
@@ -25,6 +25,27 @@ pub trait RaySource: Sync {
     /// # Errors
     /// An invalid tile, with its location.
     fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError>;
+
+    /// Decodes a tile with the geometry of its rays, if the source has it.
+    ///
+    /// # Errors
+    /// As [`Self::tile`].
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
+        self.tile(eye, index, tile)
+    }
+
+    /// The content of the hierarchy, if the source has it and the geometry of rays.
+    ///
+    /// # Errors
+    /// An invalid hierarchy.
+    fn hierarchy(&self) -> Result<Option<Hierarchy>, TileError> {
+        Ok(None)
+    }
 }
 
 impl RaySource for Raytrace {
@@ -34,6 +55,20 @@ impl RaySource for Raytrace {
 
     fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         Ok(self.decode_tile(eye, index, tile)?)
+    }
+
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
+        Ok(self.decode_tile_with_geometry(eye, index, tile)?)
+    }
+
+    fn hierarchy(&self) -> Result<Option<Hierarchy>, TileError> {
+        let found = self.has_geometry().then(|| self.read_hierarchy());
+        Ok(found.transpose()?.flatten().map(|(hierarchy, _)| hierarchy))
     }
 }
 
@@ -63,6 +98,14 @@ pub enum FrameError {
         "{0}: expected a trace with the visits of its rays (tracegen rays --visits), found a trace without"
     )]
     NoVisits(&'static str),
+    /// The stacks of rays are needed.
+    #[error(
+        "cycles.prefetch ({0}): expected a trace with its hierarchy and the geometry of its rays (tracegen rays --all-columns), found a trace without"
+    )]
+    NoColumns(&'static str),
+    /// An unreadable hierarchy.
+    #[error("{0}")]
+    Hierarchy(TileError),
     /// Frames of a sequence with different tiles.
     #[error("--between: expected frames of {}x{} tiles an eye as before, found {}x{}", expected[0], expected[1], found[0], found[1])]
     Grid {

@@ -10,7 +10,7 @@ use super::run::Run;
 use super::tile_orders::usual_plan;
 use super::ways::Way;
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::{BvhSummary, RayRecord, RayTile, Visit};
+use formats::raytrace::{BvhSummary, RayGeometry, RayRecord, RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 use sim::order::rays::{RayPlan, eye_of, tiles_of};
@@ -221,18 +221,23 @@ pub(super) fn misses_of_retests(work: &BatchWork, bvh: &BvhSummary, config: &Sgr
 /// Batches that are decoded at a time.
 const DECODED_BATCHES: usize = 32;
 
-/// The tiles of a batch.
+/// The tiles of a batch, with the geometry of their rays if it is needed.
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
 pub(super) fn decoded(
     source: &dyn RaySource,
     batch: &[WorkItem],
+    needs_geometry: bool,
 ) -> Result<Vec<RayTile>, FrameError> {
     let decode = |at: TileRef| {
         let (eye, tile) = (eye_of(at), at.tile);
         let mut data = RayTile::default();
-        let decoded = source.tile(eye, tile, &mut data);
+        let decoded = if needs_geometry {
+            source.tile_with_geometry(eye, tile, &mut data)
+        } else {
+            source.tile(eye, tile, &mut data)
+        };
         decoded.map_err(|source| FrameError::Tile { eye, tile, source })?;
         Ok(data)
     };
@@ -258,8 +263,10 @@ pub(super) fn misses_of(
     let mut found = vec![[none.clone(), none]; choices.len()];
     let batches: Vec<&[WorkItem]> = plan.batches().collect();
     for batches in batches.chunks(DECODED_BATCHES) {
-        let tiles: Vec<Result<Vec<RayTile>, FrameError>> =
-            (batches.par_iter().map(|batch| decoded(source, batch))).collect();
+        let tiles: Vec<Result<Vec<RayTile>, FrameError>> = (batches
+            .par_iter()
+            .map(|batch| decoded(source, batch, false)))
+        .collect();
         let tiles = tiles.into_iter().collect::<Result<Vec<_>, _>>()?;
         let runs = caches.par_iter_mut().zip(&mut found).zip(choices);
         runs.for_each(|((caches, found), (kept, _))| {
@@ -308,6 +315,8 @@ pub(super) struct RayTurn<'a> {
     /// True for the first ray of its pixel.
     pub is_first: bool,
     pub visits: &'a [Visit],
+    /// None if the tile was decoded without.
+    pub geometry: Option<&'a RayGeometry>,
 }
 
 /// Calls `visit` for each ray of a batch in the order of `plan`.
@@ -329,7 +338,8 @@ pub(super) fn for_rays(
             continue;
         };
         let mut first = first_visits[turn.tile][turn.pixel];
-        for (number, ray) in data.rays_of(&data.pixels[turn.pixel]).iter().enumerate() {
+        let pixel = &data.pixels[turn.pixel];
+        for (number, ray) in data.rays_of(pixel).iter().enumerate() {
             let end = first.saturating_add(ray.visit_count() as usize);
             visit(RayTurn {
                 at: places[turn.tile],
@@ -339,6 +349,7 @@ pub(super) fn for_rays(
                 ray,
                 is_first: number == 0,
                 visits: data.visits.get(first..end).unwrap_or(&[]),
+                geometry: data.geometry.get(pixel.first_ray as usize + number),
             });
             first = end;
         }

@@ -28,6 +28,7 @@ pub mod loaded;
 pub mod order_rules;
 pub mod picture;
 pub mod place;
+pub mod prefetch;
 pub mod presets;
 mod ray_batches;
 pub mod ray_kinds;

@@ -3,7 +3,7 @@
 use super::compose::Reuse;
 
 /// Named settings. A rule, a level of reuse or a parameter that the user gives replaces the preset's.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Preset {
     /// Name on the command line.
     pub name: &'static str,
@@ -18,7 +18,7 @@ pub struct Preset {
 }
 
 /// The reading of the SGRT paper that comes closest to its figure 3 on the scenes that `replay readings` calibrates on.
-static SGRT_PAPER: Preset = Preset {
+const SGRT_PAPER: Preset = Preset {
     name: "sgrt-paper",
     title: "the reading of the SGRT paper that is closest to its figure 3: every arrival is reused, with its colour where the material \
             looks the same from everywhere",
@@ -36,8 +36,29 @@ static ON_CHIP: Preset = Preset {
     parameters: "[gbuffer]\nobject_bytes = 2\ndetect_position_bytes = 4\nrows = \"chip\"\n",
 };
 
+/// The SGRT of Lee et al., "SGRT: A Mobile GPU Architecture for Real-Time Ray Tracing", HPG 2013. docs/models/sgrt.md lists
+/// where each value is from.
+static SGRT_2013: Preset = Preset {
+    name: "sgrt-2013",
+    title: "figure 3 on the SGRT of 2013: one box per issue cycle, four traversal units and an intersection unit per core",
+    parameters: "[tni]\ntrv_pipelines = 4\ntrv_cycles_per_step = 2\ntrv_cycles_per_wide_step = 8\nist_pipelines = 1\n",
+    ..SGRT_PAPER
+};
+
+/// The engine of Nah et al., "T&I Engine: Traversal and Intersection Engine for Hardware Accelerated Ray Tracing", SIGGRAPH
+/// Asia 2011.
+static TNI_2011: Preset = Preset {
+    name: "tni-2011",
+    title: "figure 3 on the T&I engine of 2011: many traversal units with one adder and one multiplier each",
+    parameters: "[tni]\ntrv_pipelines = 24\ntrv_cycles_per_step = 12\ntrv_cycles_per_wide_step = 48\nist_pipelines = 4\n\
+                 rays_in_flight = 512\n\
+                 [cache]\nnode_l1_bytes = 65536\ntriangle_l1_bytes = 65536\nl2_bytes = 262144\n\
+                 [cycles]\nl1_mshrs = 64\n",
+    ..SGRT_PAPER
+};
+
 /// All presets.
-pub static PRESETS: [&Preset; 2] = [&SGRT_PAPER, &ON_CHIP];
+pub static PRESETS: [&Preset; 4] = [&SGRT_PAPER, &ON_CHIP, &SGRT_2013, &TNI_2011];
 
 /// The preset of a name.
 pub fn find(name: &str) -> Option<&'static Preset> {

@@ -5,6 +5,7 @@ use super::cycles::{Batch, BatchSource, Item, Machine, Pipeline, Request, merge}
 use super::detect::Decision;
 use super::frame::{FrameError, RaySource};
 use super::hardware::{TileWork, decoded, for_rays, is_traced};
+use super::prefetch::Prefetcher;
 use super::srp;
 use super::ways::{Model, Way};
 use super::work::RayClass;
@@ -29,10 +30,11 @@ pub(super) struct RayBatches<'a> {
     work: &'a [TileWork],
     machine: &'a Machine,
     eyes: &'a [Eye],
+    prefetcher: Option<&'a Prefetcher>,
     /// The next batches.
     batches: Box<dyn Iterator<Item = &'a [WorkItem]> + Send + 'a>,
     /// Rays of the batch by unit and class, as ranges of its requests.
-    rays: Vec<[Vec<Range<usize>>; 3]>,
+    rays: Vec<[Vec<(Range<usize>, Eye)>; 3]>,
 }
 
 impl<'a> RayBatches<'a> {
@@ -42,7 +44,7 @@ impl<'a> RayBatches<'a> {
         model: &'a Model<'a>,
         plan: &'a RayPlan,
         work: &'a [TileWork],
-        machine: &'a Machine,
+        (machine, prefetcher): (&'a Machine, Option<&'a Prefetcher>),
         eyes: &'a [Eye],
     ) -> Self {
         Self {
@@ -55,6 +57,7 @@ impl<'a> RayBatches<'a> {
             work,
             machine,
             eyes,
+            prefetcher,
             batches: Box::new(plan.batches()),
             rays: vec![Default::default(); machine.units],
         }
@@ -81,7 +84,8 @@ impl<'a> RayBatches<'a> {
         let bvh = &frame.tables.bvh;
         let line_bytes = self.model.config.cache.line_bytes;
         for_rays(frame, self.plan, items, tiles, |of| {
-            let is_complete = eye_of(of.at) == Eye::Left || self.way == Way::Reference;
+            let eye = eye_of(of.at);
+            let is_complete = eye == Eye::Left || self.way == Way::Reference;
             let decision = self.decisions.get(of.sample).filter(|_| !is_complete);
             let rays = &mut self.rays[of.unit % self.machine.units];
             if let Some(decision) = decision.filter(|of_pixel| of.is_first && of_pixel.tests > 0) {
@@ -89,15 +93,26 @@ impl<'a> RayBatches<'a> {
                 for test in 0..u32::from(decision.tests) {
                     batch.requests.push(retest(decision, test, bvh, line_bytes));
                 }
-                rays[RayClass::Primary as usize].push(first..batch.requests.len());
+                rays[RayClass::Primary as usize].push((first..batch.requests.len(), eye));
             }
             let class = RayClass::of(of.ray);
             if decision.is_none_or(|decision| is_traced(decision, class, self.reuse)) {
                 let first = batch.requests.len();
-                let requests = of.visits.iter();
-                let requests = requests.map(|visit| request(*visit, bvh, line_bytes));
-                batch.requests.extend(requests);
-                rays[class as usize].push(first..batch.requests.len());
+                if let (Some(prefetcher), Some(geometry)) = (self.prefetcher, of.geometry) {
+                    prefetcher.for_visits(of.ray, geometry, of.visits, |visit, ahead| {
+                        let from = batch.prefetches.len() as u32;
+                        let requests = ahead.map(|visit| request(visit, bvh, line_bytes));
+                        batch.prefetches.extend(requests);
+                        batch.ahead.resize(batch.requests.len(), 0..0);
+                        batch.ahead.push(from..batch.prefetches.len() as u32);
+                        batch.requests.push(request(visit, bvh, line_bytes));
+                    });
+                } else {
+                    let requests = of.visits.iter();
+                    let requests = requests.map(|visit| request(*visit, bvh, line_bytes));
+                    batch.requests.extend(requests);
+                }
+                rays[class as usize].push((first..batch.requests.len(), eye));
             }
         });
     }
@@ -107,10 +122,11 @@ impl<'a> RayBatches<'a> {
         for (rays, items) in self.rays.iter_mut().zip(&mut batch.items) {
             if self.machine.warp_rays == 1 {
                 items.extend(rays.iter_mut().flat_map(|of_class| of_class.drain(..)).map(
-                    |range| Item {
+                    |(range, eye)| Item {
                         first: range.start as u32,
                         end: range.end as u32,
                         rays: 1,
+                        eye,
                     },
                 ));
                 // In order of the trace, whatever the class.
@@ -121,7 +137,7 @@ impl<'a> RayBatches<'a> {
                 for warp in of_class.chunks(self.machine.warp_rays as usize) {
                     let mut merged = Vec::new();
                     let paths: Vec<&[Request]> = (warp.iter())
-                        .map(|range| &batch.requests[range.clone()])
+                        .map(|(range, _)| &batch.requests[range.clone()])
                         .collect();
                     merge(&paths, &mut merged);
                     let first = batch.requests.len() as u32;
@@ -130,6 +146,7 @@ impl<'a> RayBatches<'a> {
                         first,
                         end: batch.requests.len() as u32,
                         rays: warp.len() as u32,
+                        eye: warp[0].1,
                     });
                 }
                 of_class.clear();
@@ -158,7 +175,7 @@ impl BatchSource for RayBatches<'_> {
                 break of_eyes;
             }
         };
-        let tiles = decoded(self.source, &items)?;
+        let tiles = decoded(self.source, &items, self.prefetcher.is_some())?;
         self.add_rays(&items, &tiles, batch);
         self.make_items(batch);
         let of_cores = &self.model.batch(self.way, &items, self.work);

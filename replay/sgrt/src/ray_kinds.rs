@@ -1,7 +1,7 @@
 //! A ray trace reduced to rays of some kinds, to measure each kind's share of the caches.
 
 use super::frame::{RaySource, TileError};
-use formats::raytrace::{RayKind, RayTile, RaytraceTables};
+use formats::raytrace::{Hierarchy, RayKind, RayTile, RaytraceTables};
 use formats::view::Eye;
 
 /// A source without the rays of other kinds. Pixels keep their hits and colours.
@@ -19,18 +19,48 @@ impl RaySource for OfKinds<'_> {
 
     fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         self.source.tile(eye, index, tile)?;
+        self.keep(tile);
+        Ok(())
+    }
+
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
+        self.source.tile_with_geometry(eye, index, tile)?;
+        self.keep(tile);
+        Ok(())
+    }
+
+    fn hierarchy(&self) -> Result<Option<Hierarchy>, TileError> {
+        self.source.hierarchy()
+    }
+}
+
+impl OfKinds<'_> {
+    /// Removes the rays of other kinds.
+    fn keep(&self, tile: &mut RayTile) {
         if self.kinds.is_empty() {
-            return Ok(());
+            return;
         }
         let rays = std::mem::take(&mut tile.rays);
         let visits = std::mem::take(&mut tile.visits);
+        let geometry = std::mem::take(&mut tile.geometry);
         let (mut ray, mut at) = (0usize, 0usize);
         for pixel in &mut tile.pixels {
             let first = tile.rays.len();
-            for record in rays.iter().skip(ray).take(pixel.ray_count as usize) {
+            for (number, record) in rays
+                .iter()
+                .enumerate()
+                .skip(ray)
+                .take(pixel.ray_count as usize)
+            {
                 let end = at.saturating_add(record.visit_count() as usize);
                 if self.kinds.contains(&record.kind) {
                     tile.rays.push(*record);
+                    tile.geometry.extend(geometry.get(number));
                     tile.visits.extend(visits.get(at..end).unwrap_or(&[]));
                 }
                 at = end;
@@ -39,7 +69,6 @@ impl RaySource for OfKinds<'_> {
             pixel.first_ray = first as u32;
             pixel.ray_count = (tile.rays.len() - first) as u32;
         }
-        Ok(())
     }
 }
 

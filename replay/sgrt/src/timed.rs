@@ -4,13 +4,16 @@
 
 use super::cache::Misses;
 use super::compose::Reuse;
-use super::cycles::{Counts, LineCounts, Machine, Simulated, SimulationError, simulate};
+use super::cycles::{
+    Counts, LineCounts, Machine, PrefetchCounts, Simulated, SimulationError, simulate,
+};
 use super::detect::Decision;
 use super::energy;
 use super::frame::{FrameError, RaySource};
 use super::hardware::{Comparison, Kept, TileMisses, TileWork, check_lines, misses_in_usual_order};
+use super::prefetch::Prefetcher;
 use super::ray_batches::RayBatches;
-use super::timing::{CycleTiming, FrameTiming, IdlePct};
+use super::timing::{CycleTiming, FrameTiming, IdlePct, PrefetchTiming};
 use super::tni::TniCycles;
 use super::ways::{Model, Way, WayRun, comparison};
 use formats::view::Eye;
@@ -23,6 +26,7 @@ const TRACED: [&[Eye]; 3] = [&[Eye::Left, Eye::Right], &[Eye::Left], &[Eye::Righ
 /// The simulations without reprojection. They do not depend on the rule.
 pub struct TracedTiming {
     machine: Machine,
+    prefetcher: Option<Prefetcher>,
     frame: Simulated,
     left: FrameTiming,
     right: FrameTiming,
@@ -45,10 +49,12 @@ impl TracedTiming {
         }
         check_lines(&tables.bvh, model.config)?;
         let machine = Machine::new(model.config, tables.bvh.traversal);
+        let prefetcher = Prefetcher::new(&model.config.cycles.prefetch, source)?;
+        let units = (&machine, prefetcher.as_ref());
         let mut runs: Vec<Simulated> = TRACED
             .par_iter()
             .map(|eyes| {
-                let rays = RayBatches::reference(source, model, plan, work, &machine, eyes);
+                let rays = RayBatches::reference(source, model, plan, work, units, eyes);
                 run(&machine, rays)
             })
             .collect::<Result<_, _>>()?;
@@ -75,6 +81,7 @@ impl TracedTiming {
             left,
             right,
             machine,
+            prefetcher,
         })
     }
 }
@@ -103,7 +110,8 @@ pub(super) fn compare(
     let simulated: Vec<Simulated> = [Way::Reprojected, Way::WholeScreen]
         .par_iter()
         .map(|&way| {
-            let all = RayBatches::reference(source, model, plans[1], work, machine, TRACED[0]);
+            let units = (machine, traced.prefetcher.as_ref());
+            let all = RayBatches::reference(source, model, plans[1], work, units, TRACED[0]);
             run(machine, all.reprojected(way, decisions, reuse))
         })
         .collect::<Result<_, _>>()?;
@@ -147,7 +155,8 @@ fn run(machine: &Machine, mut rays: RayBatches) -> Result<Simulated, FrameError>
 
 fn misses(counts: &Counts) -> Misses {
     Misses {
-        l1_lines: (counts.node_l1.misses + counts.triangle_l1.misses) as f64,
+        // Every L2 look-up of a ray or a prefetch fetches a line for an L1.
+        l1_lines: counts.l2.all() as f64,
         l2_lines: counts.l2.misses as f64,
         l1_visits: counts.l1_fetching_requests as f64,
         l2_visits: counts.l2_fetching_requests as f64,
@@ -207,6 +216,7 @@ fn timing(
     let hit = |line: &LineCounts| pct((line.hits + line.merged) as f64, line.all() as f64);
     let l1_look_ups = counts.node_l1.all() + counts.triangle_l1.all();
     let merged = counts.node_l1.merged + counts.triangle_l1.merged;
+    let l1_misses = counts.node_l1.misses + counts.triangle_l1.misses;
     let [own, same] = closed_form;
     FrameTiming {
         cycles,
@@ -236,6 +246,26 @@ fn timing(
         l2_hit_pct: hit(&counts.l2),
         l1_merged_pct: pct(merged as f64, l1_look_ups as f64),
         mshr_waits: counts.l1_mshr_waits + counts.l2_mshr_waits,
+        l1_misses,
+        dram_lines: counts.dram_lines,
+        prefetch: (counts.prefetch.requested > 0).then(|| prefetches(&counts.prefetch, l1_misses)),
+    }
+}
+
+fn prefetches(p: &PrefetchCounts, l1_misses: u64) -> PrefetchTiming {
+    let used = p.useful + p.late;
+    PrefetchTiming {
+        requested: p.requested,
+        held: p.held,
+        dropped: p.dropped,
+        issued: p.issued,
+        useful: p.useful,
+        late: p.late,
+        useless: p.useless,
+        dram_lines: p.dram_lines,
+        of_other_eye: p.of_other_eye,
+        accuracy_pct: pct(used as f64, p.issued as f64),
+        covered_pct: pct(used as f64, (used + l1_misses) as f64),
     }
 }
 

@@ -71,6 +71,41 @@ pub struct FrameTiming {
     pub l1_merged_pct: f64,
     /// Times that a request waited for an MSHR.
     pub mshr_waits: u64,
+    /// Lines that rays fetched into the L1 caches.
+    pub l1_misses: u64,
+    /// Lines read from DRAM.
+    pub dram_lines: u64,
+    /// What the prefetcher did, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prefetch: Option<PrefetchTiming>,
+}
+
+/// Lines that a prefetcher asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct PrefetchTiming {
+    /// All of them: held, dropped and issued ones.
+    pub requested: u64,
+    /// In the L1 or in flight already.
+    pub held: u64,
+    /// Given up for want of an MSHR.
+    pub dropped: u64,
+    /// Fetched into an L1: useful, late and useless ones.
+    pub issued: u64,
+    /// Requested by a ray after their arrival.
+    pub useful: u64,
+    /// Requested by a ray before their arrival.
+    pub late: u64,
+    /// Requested by no ray before their eviction or the end.
+    pub useless: u64,
+    /// Issued ones that were read from DRAM.
+    pub dram_lines: u64,
+    /// Held ones and ones found in the L2 that the other eye had fetched last.
+    pub of_other_eye: u64,
+    /// Share of issued lines that a ray requested.
+    pub accuracy_pct: f64,
+    /// Share of these lines in them and the remaining misses of the L1 caches.
+    pub covered_pct: f64,
 }
 
 /// Shares of a unit's cycles in which no pipeline is occupied. A cycle counts for the first cause that applies.

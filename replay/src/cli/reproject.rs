@@ -16,6 +16,7 @@ use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use sgrt::loaded::{LoadedTrace, RuleRun};
 use sgrt::picture;
+use sgrt::prefetch::RayPrefetching;
 use sgrt::ray_kinds::OfKinds;
 use sgrt::result::{Config, Report, SCHEMA};
 use sgrt::tile_orders::{self, RayOrder, TileSequence};
@@ -40,6 +41,7 @@ use std::process::ExitCode;
   replay reproject teapot.raytrace --preset sgrt-paper
   replay reproject teapot.raytrace --rule none --image plain.png --json
   replay reproject teapot.raytrace --timing cycle
+  replay reproject teapot.raytrace --timing cycle --prefetch ttp
   replay reproject chess.raytrace --order z2-sta+offset
   replay reproject f0.raytrace f1.raytrace f2.raytrace --order sampled --between keep
   replay reproject *.raytrace --html out/reprojection.html
@@ -54,6 +56,9 @@ pub struct ReprojectArgs {
     /// Model of the units' time
     #[arg(long, value_parser = choice::<Timing>(), default_value = "closed-form")]
     timing: Timing,
+    /// What the units fetch ahead into their caches, with --timing cycle [default: none, or the configuration's]
+    #[arg(long, value_parser = choice::<RayPrefetching>())]
+    prefetch: Option<RayPrefetching>,
     #[arg(long, help = tile_orders::help(), value_parser = str::parse::<RayOrder>)]
     order: Option<RayOrder>,
     /// Files are consecutive frames of a path, between which the caches keep, lose-N or flush their lines: lose-N
@@ -91,10 +96,10 @@ pub struct ReprojectArgs {
 /// A file that cannot be read, invalid parameters, or an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.threads.start()?;
-    let config = args.reused.parameters()?;
+    let config = args.parameters()?;
     if args.print_config {
-        let text = match (args.reused.preset, &args.reused.config) {
-            (None, None) => DEFAULT_TOML.to_owned(),
+        let text = match (args.reused.preset, &args.reused.config, args.prefetch) {
+            (None, None, None) => DEFAULT_TOML.to_owned(),
             _ => toml::to_string(&config)?,
         };
         super::print(&text)?;
@@ -105,7 +110,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
-    check_closed_form(&args)?;
+    check_timing(&args)?;
     // Report a wrong --as before the replays.
     paper::values("", "", &args.paper_scenes)?;
     let mut outputs = args.outputs.list::<ReprojectReport>()?;
@@ -128,6 +133,15 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl ReprojectArgs {
+    fn parameters(&self) -> anyhow::Result<SgrtConfig> {
+        let mut config = self.reused.parameters()?;
+        if let Some(prefetcher) = self.prefetch {
+            config.cycles.prefetch.prefetcher = prefetcher;
+            config.check().context("--prefetch")?;
+        }
+        Ok(config)
+    }
+
     fn tiles(&self) -> TileSequence {
         TileSequence::new(self.order, self.between)
     }
@@ -144,11 +158,16 @@ fn ray_kind(name: &str) -> Result<RayKind, String> {
     })
 }
 
-/// Refuses options that only the closed form supports, or only the default order of tiles.
-fn check_closed_form(args: &ReprojectArgs) -> anyhow::Result<()> {
+/// Refuses options that only one model of time supports, or only the default order of tiles.
+fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
     ensure!(
         args.timing == Timing::ClosedForm || args.between.is_none(),
         "--between: expected --timing closed-form, found --timing {}",
+        args.timing.name()
+    );
+    ensure!(
+        args.timing == Timing::Cycle || args.prefetch.is_none(),
+        "--prefetch: expected --timing cycle, found --timing {}",
         args.timing.name()
     );
     for (option, is_given) in [("--curve", args.curve), ("--sensitivity", args.sensitivity)] {
@@ -355,6 +374,23 @@ mod tests {
     fn a_single_picture_for_several_files_is_refused() {
         let error = run(args(&["a", "b", "--image", "c.png"])).unwrap_err();
         assert_eq!(error.to_string(), "--image: expected one FILE, found 2");
+    }
+
+    #[test]
+    fn a_prefetcher_needs_the_cycle_level_model_and_the_stacks_of_rays() {
+        let (_folder, path) = trace_file();
+        let error = run(args(&[&path, "--prefetch", "ttp"])).unwrap_err();
+        let expected = "--prefetch: expected --timing cycle, found --timing closed-form";
+        assert_eq!(error.to_string(), expected);
+        let source = trace(&wall(4.0, [30.0, 30.0], 0.0, 1), View::default()).with_visits();
+        std::fs::write(&path, source.to_bytes()).expect("written");
+        let error = run(args(&[&path, "--prefetch", "ttp", "--timing", "cycle"])).unwrap_err();
+        let text = format!("{error:#}");
+        assert!(
+            text.contains("cycles.prefetch (ttp): expected a trace with"),
+            "{text}"
+        );
+        assert!(text.contains("tracegen rays --all-columns"), "{text}");
     }
 
     #[test]

@@ -4,16 +4,81 @@ use super::Entry;
 use super::tables::scene_name;
 use crate::columns::{Column, Show};
 use crate::table::Table;
-use sgrt::timing::FrameTiming;
+use sgrt::timing::{FrameTiming, PrefetchTiming};
 
 /// Title of the table.
 pub const TITLE: &str = "Units cycle by cycle, and the closed form";
+
+/// Title of the table of prefetches.
+pub const PREFETCH_TITLE: &str = "Lines that the units fetched ahead";
 
 /// A simulation.
 struct UnitsRow<'a> {
     scene: String,
     run: &'static str,
     timing: &'a FrameTiming,
+}
+
+/// The simulations of all traces; none if the closed form was used.
+fn runs(entries: &[Entry]) -> Vec<UnitsRow<'_>> {
+    let mut rows = Vec::new();
+    for Entry { report, .. } in entries {
+        let (Some(chosen), Some(plain)) = (&report.result.cycles, &report.plain.cycles) else {
+            continue;
+        };
+        let runs = [
+            ("left eye alone", &chosen.left),
+            ("right eye alone", &chosen.right),
+            ("both eyes in full", &chosen.reference),
+            ("chosen", &chosen.reprojected),
+            ("plain", &plain.reprojected),
+        ];
+        rows.extend(runs.map(|(run, timing)| UnitsRow {
+            scene: scene_name(report),
+            run,
+            timing,
+        }));
+    }
+    rows
+}
+
+/// One row per simulation with a prefetcher; `None` without one.
+#[rustfmt::skip]
+pub fn prefetches(entries: &[Entry]) -> Option<Table> {
+    let of = |r: &UnitsRow| r.timing.prefetch.unwrap_or_default();
+    let lines = |key, name, value: fn(&PrefetchTiming) -> u64| {
+        Column::new(key, name, "", Show::Whole, move |r: &UnitsRow| value(&of(r)))
+    };
+    let columns = [
+        Column::text("scene", "scene", |r: &UnitsRow| r.scene.clone()),
+        Column::text("run", "run", |r: &UnitsRow| r.run),
+        lines("requested", "lines to prefetch", |p| p.requested),
+        lines("held", "held", |p| p.held),
+        lines("dropped", "dropped", |p| p.dropped),
+        lines("issued", "issued", |p| p.issued),
+        lines("useful", "useful", |p| p.useful),
+        lines("late", "late", |p| p.late),
+        lines("useless", "useless", |p| p.useless),
+        Column::real("accuracy_pct", "accuracy", "%", 1, move |r: &UnitsRow| of(r).accuracy_pct),
+        Column::real("covered_pct", "misses covered", "%", 1, move |r: &UnitsRow| of(r).covered_pct),
+        lines("prefetched_dram_lines", "from DRAM", |p| p.dram_lines),
+        lines("of_other_eye", "of the other eye", |p| p.of_other_eye),
+    ];
+    let mut rows = runs(entries);
+    rows.retain(|row| row.timing.prefetch.is_some());
+    table(&columns, &rows, PREFETCH_TITLE)
+}
+
+fn table<'a>(
+    columns: &[Column<'_, UnitsRow<'a>>],
+    rows: &[UnitsRow<'a>],
+    title: &'static str,
+) -> Option<Table> {
+    (!rows.is_empty()).then(|| {
+        let mut table = Table::new(columns, rows).grouped_by(1);
+        table.caption = title;
+        table
+    })
 }
 
 /// One row per simulation; `None` if the closed form was used.
@@ -46,23 +111,5 @@ pub fn units(entries: &[Entry]) -> Option<Table> {
         cycles("rays", "rays", |t| t.rays_left),
         cycles("requests", "requests", |t| t.requests),
     ];
-    let mut rows = Vec::new();
-    for Entry { report, .. } in entries {
-        let (Some(chosen), Some(plain)) = (&report.result.cycles, &report.plain.cycles) else {
-            continue;
-        };
-        let runs = [
-            ("left eye alone", &chosen.left),
-            ("right eye alone", &chosen.right),
-            ("both eyes in full", &chosen.reference),
-            ("chosen", &chosen.reprojected),
-            ("plain", &plain.reprojected),
-        ];
-        rows.extend(runs.map(|(run, timing)| UnitsRow { scene: scene_name(report), run, timing }));
-    }
-    (!rows.is_empty()).then(|| {
-        let mut table = Table::new(&columns, &rows).grouped_by(1);
-        table.caption = TITLE;
-        table
-    })
+    table(&columns, &runs(entries), TITLE)
 }

@@ -1,5 +1,8 @@
 //! The input of the simulation: rays and their requests, one batch per tile of an eye.
 
+use formats::view::Eye;
+use std::ops::Range;
+
 /// The pipelines that a request goes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Pipeline {
@@ -29,6 +32,8 @@ pub struct Item {
     pub end: u32,
     /// Rays that advance together; 1 for single rays.
     pub rays: u32,
+    /// The eye of its rays.
+    pub eye: Eye,
 }
 
 /// A tile of one eye.
@@ -36,6 +41,11 @@ pub struct Item {
 pub struct Batch {
     /// Requests of all items.
     pub requests: Vec<Request>,
+    /// By request, what its ray fetches ahead when it begins the request, as a range of [`Self::prefetches`]; shorter than
+    /// [`Self::requests`] if later requests fetch nothing.
+    pub ahead: Vec<Range<u32>>,
+    /// What is fetched ahead.
+    pub prefetches: Vec<Request>,
     /// Items by unit, in order of dispatch.
     pub items: Vec<Vec<Item>>,
     /// Unit cycles that the shader cores spend on the tile.
@@ -48,6 +58,8 @@ impl Batch {
     /// Empties the batch for `units` units and keeps its memory.
     pub fn clear(&mut self, units: usize) {
         self.requests.clear();
+        self.ahead.clear();
+        self.prefetches.clear();
         self.items.resize_with(units, Vec::new);
         self.items.iter_mut().for_each(Vec::clear);
         (self.core_cycles, self.core_lines) = (0, 0);

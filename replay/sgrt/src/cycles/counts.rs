@@ -53,6 +53,29 @@ impl UnitCycles {
     }
 }
 
+/// Lines that a prefetcher asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PrefetchCounts {
+    /// All of them.
+    pub requested: u64,
+    /// Resident or in flight already.
+    pub held: u64,
+    /// Given up for want of an MSHR.
+    pub dropped: u64,
+    /// Fetched into an L1.
+    pub issued: u64,
+    /// Of the fetched ones, those that a ray requested after their arrival.
+    pub useful: u64,
+    /// Those that a ray requested before their arrival.
+    pub late: u64,
+    /// Those that no ray requested before their eviction or the end.
+    pub useless: u64,
+    /// Of the fetched ones, those that were not in the L2.
+    pub dram_lines: u64,
+    /// Held ones and ones found in the L2 that the other eye had fetched last.
+    pub of_other_eye: u64,
+}
+
 /// Counters since the start, or of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -86,6 +109,8 @@ pub struct Counts {
     pub l1_mshr_waits: u64,
     /// Times that a request waited for an MSHR of the L2.
     pub l2_mshr_waits: u64,
+    /// What a prefetcher asked for.
+    pub prefetch: PrefetchCounts,
     /// Cycles of all units by cause.
     pub cycles: UnitCycles,
 }
@@ -113,6 +138,20 @@ impl Counts {
         self.triangle_l1.add(&other.triangle_l1);
         self.l2.add(&other.l2);
         self.cycles.add(&other.cycles);
+        let (own, other) = (&mut self.prefetch, &other.prefetch);
+        sim::add_fields!(
+            own,
+            other,
+            requested,
+            held,
+            dropped,
+            issued,
+            useful,
+            late,
+            useless,
+            dram_lines,
+            of_other_eye
+        );
     }
 
     /// Checks the counters at the end of a simulation of `rays` rays with `requests` requests.
@@ -121,14 +160,25 @@ impl Counts {
     /// The first sum that is not conserved.
     pub(super) fn check(&self, rays: u64, requests: u64) -> Result<(), Unbalanced> {
         let l1_misses = self.node_l1.misses + self.triangle_l1.misses;
+        let p = &self.prefetch;
         let sums = [
             ("rays that entered", rays, self.rays_entered),
             ("rays that left", rays, self.rays_left),
             ("requests", requests, self.requests),
             ("answers to requests", requests, self.answers),
             ("steps and tests", requests, self.steps + self.tests),
-            ("L2 look-ups", l1_misses, self.l2.all()),
+            ("L2 look-ups", l1_misses + p.issued, self.l2.all()),
             ("lines read from DRAM", self.l2.misses, self.dram_lines),
+            (
+                "outcomes of prefetches",
+                p.issued,
+                p.useful + p.late + p.useless,
+            ),
+            (
+                "lines to prefetch",
+                p.requested,
+                p.held + p.dropped + p.issued,
+            ),
         ];
         check_balance("cycle-level model", &sums)
     }

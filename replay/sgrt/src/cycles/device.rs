@@ -61,6 +61,7 @@ pub fn simulate<S: BatchSource>(
     let mut device = Device::new(machine);
     device.run(source).map_err(SimulationError::Source)?;
     let (rays, requests) = device.expected;
+    device.counts.prefetch.useless += device.memory.unused_prefetches();
     device.out.counts.add(&device.counts);
     let counts = &device.out.counts;
     counts

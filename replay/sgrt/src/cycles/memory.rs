@@ -2,12 +2,13 @@
 //!
 //! Fills take place when lines arrive. Further look-ups of a line in flight merge with its fetch. A miss needs a free
 //! MSHR of its L1, and one of the L2 if it misses there too; otherwise it waits in the queue of the first level without
-//! one, and nothing is fetched.
+//! one, and nothing is fetched. A prefetch takes the same way, but is dropped if it finds no MSHR.
 
 use super::counts::{Counts, LineCounts};
 use super::machine::{CacheSize, Machine};
+use formats::view::Eye;
 use sim::memory::{AnyCache, Cache, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT, SimpleMemory};
-use std::collections::VecDeque;
+use std::collections::{HashMap, HashSet, VecDeque};
 
 /// A cache with its lines in flight, its MSHRs, and the rays that wait for one.
 pub struct Level {
@@ -17,6 +18,10 @@ pub struct Level {
     waiting: VecDeque<(usize, usize)>,
     /// True if a retry is scheduled.
     scheduled: bool,
+    /// Prefetched lines that no ray has requested. Evicted ones are removed when they are fetched again.
+    unused: HashSet<u32>,
+    /// The eye that fetched each line last.
+    fetched_by: HashMap<u32, Eye>,
 }
 
 impl Level {
@@ -27,7 +32,14 @@ impl Level {
             mshrs: LimitedMshrs::new(size.mshrs),
             waiting: VecDeque::new(),
             scheduled: false,
+            unused: HashSet::new(),
+            fetched_by: HashMap::new(),
         }
+    }
+
+    /// True if the other eye fetched the line last.
+    fn is_of_other(&self, line: u32, eye: Eye) -> bool {
+        self.fetched_by.get(&line).is_some_and(|by| *by != eye)
     }
 
     /// Appends a ray to the queue.
@@ -112,9 +124,9 @@ impl CacheMemory {
     /// Looks up a line in an L1 (node cache: kind 0, triangle cache: kind 1) and fetches it if necessary.
     pub fn look_up(
         &mut self,
-        unit: usize,
-        kind: usize,
+        (unit, kind): (usize, usize),
         line: u32,
+        eye: Eye,
         now: u64,
         counts: &mut Counts,
     ) -> Found {
@@ -126,11 +138,13 @@ impl CacheMemory {
         match level.cache.look_up(line, now) {
             0 => {
                 of_l1.hits += 1;
+                counts.prefetch.useful += u64::from(level.unused.remove(&line));
                 return Found::Hit;
             }
             NOT_IN_FLIGHT => {}
             arrival => {
                 of_l1.merged += 1;
+                counts.prefetch.late += u64::from(level.unused.remove(&line));
                 return Found::Later {
                     arrival,
                     fetches_l1: false,
@@ -142,6 +156,73 @@ impl CacheMemory {
             counts.l1_mshr_waits += 1;
             return Found::Full(Full::L1);
         }
+        let Some((arrival, fetches_l2)) = self.fetch(line, eye, now, counts) else {
+            counts.l2_mshr_waits += 1;
+            return Found::Full(Full::L2);
+        };
+        let level = &mut self.l1[2 * unit + kind];
+        counts.prefetch.useless += u64::from(level.unused.remove(&line));
+        match kind {
+            0 => counts.node_l1.misses += 1,
+            _ => counts.triangle_l1.misses += 1,
+        }
+        self.fill((unit, kind), line, eye, now, arrival);
+        Found::Later {
+            arrival,
+            fetches_l1: true,
+            fetches_l2,
+        }
+    }
+
+    /// Fetches a line ahead into an L1, unless it is there or in flight or finds no MSHR.
+    pub fn prefetch(
+        &mut self,
+        (unit, kind): (usize, usize),
+        line: u32,
+        eye: Eye,
+        now: u64,
+        counts: &mut Counts,
+    ) {
+        counts.prefetch.requested += 1;
+        let level = &mut self.l1[2 * unit + kind];
+        if level.cache.holds(line, now) {
+            counts.prefetch.held += 1;
+            counts.prefetch.of_other_eye += u64::from(level.is_of_other(line, eye));
+            return;
+        }
+        if level.mshrs.are_in_use(now) {
+            counts.prefetch.dropped += 1;
+            return;
+        }
+        let is_of_other = self.l2.is_of_other(line, eye);
+        let Some((arrival, fetches_l2)) = self.fetch(line, eye, now, counts) else {
+            counts.prefetch.dropped += 1;
+            return;
+        };
+        counts.prefetch.issued += 1;
+        counts.prefetch.dram_lines += u64::from(fetches_l2);
+        counts.prefetch.of_other_eye += u64::from(is_of_other && !fetches_l2);
+        let was_unused = !self.l1[2 * unit + kind].unused.insert(line);
+        counts.prefetch.useless += u64::from(was_unused);
+        self.fill((unit, kind), line, eye, now, arrival);
+    }
+
+    /// Fills a line into an L1 at its arrival.
+    fn fill(&mut self, (unit, kind): (usize, usize), line: u32, eye: Eye, now: u64, arrival: u64) {
+        let level = &mut self.l1[2 * unit + kind];
+        level.cache.enter(line, now, arrival);
+        level.mshrs.enter(arrival);
+        level.fetched_by.insert(line, eye);
+    }
+
+    /// Prefetched lines that no ray requested, at the end.
+    pub fn unused_prefetches(&self) -> u64 {
+        self.l1.iter().map(|level| level.unused.len() as u64).sum()
+    }
+
+    /// Looks up a line in the L2 and fetches it if necessary. Returns its arrival at an L1, and whether it was fetched; `None`
+    /// without a free MSHR.
+    fn fetch(&mut self, line: u32, eye: Eye, now: u64, counts: &mut Counts) -> Option<(u64, bool)> {
         let (in_l2, fetches_l2) = match self.l2.cache.look_up(line, now) {
             0 => {
                 counts.l2.hits += 1;
@@ -149,14 +230,14 @@ impl CacheMemory {
             }
             NOT_IN_FLIGHT => {
                 if self.l2.mshrs.are_in_use(now) {
-                    counts.l2_mshr_waits += 1;
-                    return Found::Full(Full::L2);
+                    return None;
                 }
                 counts.l2.misses += 1;
                 counts.dram_lines += 1;
                 let arrival = self.dram.read(now);
                 self.l2.cache.enter(line, now, arrival);
                 self.l2.mshrs.enter(arrival);
+                self.l2.fetched_by.insert(line, eye);
                 (arrival, true)
             }
             arrival => {
@@ -164,14 +245,6 @@ impl CacheMemory {
                 (arrival, false)
             }
         };
-        of_l1.misses += 1;
-        let arrival = in_l2 + self.l2_latency;
-        level.cache.enter(line, now, arrival);
-        level.mshrs.enter(arrival);
-        Found::Later {
-            arrival,
-            fetches_l1: true,
-            fetches_l2,
-        }
+        Some((in_l2 + self.l2_latency, fetches_l2))
     }
 }

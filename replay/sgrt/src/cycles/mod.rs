@@ -40,7 +40,7 @@ mod unit;
 mod warp;
 
 pub use batch::{Batch, BatchSource, Item, Pipeline, Request};
-pub use counts::{Counts, LineCounts};
+pub use counts::{Counts, LineCounts, PrefetchCounts};
 pub use device::{BatchTiming, Simulated, SimulationError, simulate};
 pub use machine::Machine;
 pub(super) use warp::merge;

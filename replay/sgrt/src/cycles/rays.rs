@@ -29,7 +29,9 @@ impl Device<'_> {
             s.from_dram = false;
             s.fetched = [false; 2];
             self.counts.requests += 1;
+            let (batch, request) = (s.batch, s.request as usize);
             self.look_up(unit, slot, now);
+            self.prefetch(unit, slot, (batch, request), now);
             return;
         }
         let (returns, calendar) = (&mut self.returns, &mut self.calendar);
@@ -42,6 +44,22 @@ impl Device<'_> {
         });
     }
 
+    /// Fetches ahead what a request of a batch says.
+    fn prefetch(&mut self, unit: usize, slot: usize, (batch, request): (u64, usize), now: u64) {
+        let batch = &self.loaded[(batch - self.first) as usize].batch;
+        let Some(ahead) = batch.ahead.get(request) else {
+            return;
+        };
+        let eye = self.units[unit].slots[slot].eye;
+        for of in &batch.prefetches[ahead.start as usize..ahead.end as usize] {
+            for line in of.first_line..of.first_line + of.lines {
+                let level = (unit, of.pipeline as usize);
+                self.memory
+                    .prefetch(level, line, eye, now, &mut self.counts);
+            }
+        }
+    }
+
     /// Looks up the remaining lines of a slot's request.
     fn look_up(&mut self, unit: usize, slot: usize, now: u64) {
         let (u, counts) = (&mut self.units[unit], &mut self.counts);
@@ -51,7 +69,7 @@ impl Device<'_> {
         let kind = request.pipeline as usize;
         while s.lines_done < request.lines {
             let line = request.first_line + s.lines_done;
-            match self.memory.look_up(unit, kind, line, now, counts) {
+            match self.memory.look_up((unit, kind), line, s.eye, now, counts) {
                 Found::Hit => {}
                 Found::Later {
                     arrival,

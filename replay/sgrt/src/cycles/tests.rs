@@ -4,6 +4,7 @@ use super::machine::{CacheSize, Pipelines};
 use super::*;
 use crate::config::SgrtConfig;
 use formats::raytrace::TraversalKind;
+use formats::view::Eye;
 use proptest::prelude::*;
 use sim::memory::TICKS;
 use std::convert::Infallible;
@@ -51,6 +52,7 @@ fn batch(units: usize, rays: &[Vec<Request>]) -> Batch {
             first,
             end: out.requests.len() as u32,
             rays: 1,
+            eye: Eye::Left,
         });
     }
     out
@@ -75,6 +77,42 @@ fn a_lone_ray_takes_the_sum_of_its_latencies() {
     assert_eq!((step, test, from_l2, m.dram_latency), (24, 40, 20, 60));
     let counts = simulated.counts;
     assert_eq!((counts.steps, counts.tests, counts.dram_lines), (4, 2, 2));
+}
+
+/// A chain of dependent nodes that are all fetched ahead with the first one takes one latency of memory.
+#[test]
+fn a_perfect_prefetch_hides_all_latencies_but_the_first() {
+    let m = machine();
+    let ray: Vec<Request> = (0..10)
+        .map(|k| request(100 * k, Pipeline::Traversal))
+        .collect();
+    let mut batch = batch(m.units, &[ray.clone()]);
+    let step = m.pipelines[0].latency;
+    let from_dram = m.l2_latency + m.dram_latency;
+    assert_eq!(
+        run(&m, &[batch.clone()]).unit_cycles,
+        10 * (step + from_dram) + 2
+    );
+    batch.prefetches = ray[1..].to_vec();
+    batch.ahead = vec![0..9];
+    let simulated = run(&m, &[batch.clone()]);
+    assert_eq!(simulated.unit_cycles, 10 * step + from_dram + 2);
+    let p = simulated.counts.prefetch;
+    assert_eq!((p.issued, p.useful, p.dram_lines), (9, 9, 9));
+    // Each node fetches the next one ahead as it begins: every other node waits for the rest of the latency.
+    batch.ahead = (0..9).map(|k| k..k + 1).collect();
+    let simulated = run(&m, &[batch.clone()]);
+    assert_eq!(simulated.unit_cycles, 6 * step + 5 * from_dram + 2);
+    let p = simulated.counts.prefetch;
+    assert_eq!((p.useful, p.late), (5, 4));
+    // Lines that nobody requests cost bytes alone.
+    batch
+        .prefetches
+        .iter_mut()
+        .for_each(|request| request.first_line += 1);
+    let simulated = run(&m, &[batch]);
+    assert_eq!(simulated.counts.prefetch.useless, 9);
+    assert_eq!(simulated.counts.dram_lines, 19);
 }
 
 #[test]
@@ -239,13 +277,13 @@ fn machines() -> impl Strategy<Value = Machine> {
     })
 }
 
-/// A unit and a path, for each item of a batch.
-type Paths = Vec<(usize, u32, Vec<(u32, u32, bool)>)>;
+/// A unit, rays, a path and the number of its steps that fetch ahead, for each item of a batch.
+type Paths = Vec<(usize, u32, Vec<(u32, u32, bool)>, usize)>;
 
 fn paths() -> impl Strategy<Value = Paths> {
     let step = (0_u32..24, 1_u32..4, any::<bool>());
     let path = prop::collection::vec(step, 0..10);
-    prop::collection::vec((0_usize..4, 1_u32..4, path), 0..14)
+    prop::collection::vec((0_usize..4, 1_u32..4, path, 0_usize..4), 0..14)
 }
 
 fn batches() -> impl Strategy<Value = Vec<(Paths, u64, u64)>> {
@@ -255,23 +293,32 @@ fn batches() -> impl Strategy<Value = Vec<(Paths, u64, u64)>> {
 fn to_batch(units: usize, (paths, core_cycles, core_lines): &(Paths, u64, u64)) -> Batch {
     let mut out = Batch::default();
     out.clear(units);
-    for (unit, rays, path) in paths {
+    let pipeline = |node| [Pipeline::Intersection, Pipeline::Traversal][usize::from(node)];
+    for (unit, rays, path, ahead) in paths {
         let first = out.requests.len() as u32;
         out.requests
             .extend(path.iter().map(|&(first_line, lines, node)| Request {
                 first_line,
                 lines,
-                pipeline: if node {
-                    Pipeline::Traversal
-                } else {
-                    Pipeline::Intersection
-                },
+                pipeline: pipeline(node),
             }));
         out.items[unit % units].push(Item {
             first,
             end: out.requests.len() as u32,
             rays: *rays,
+            eye: [Eye::Left, Eye::Right][unit % 2],
         });
+        // A path's first steps fetch its last ones ahead, and lines that nobody needs.
+        for (number, (line, lines, node)) in path.iter().rev().enumerate().take(*ahead) {
+            let at = out.prefetches.len() as u32;
+            out.ahead.resize(first as usize + number + 1, at..at);
+            out.prefetches.push(Request {
+                first_line: line + 7 * (number as u32 % 2),
+                lines: *lines,
+                pipeline: pipeline(*node),
+            });
+            out.ahead[first as usize + number].end += 1;
+        }
     }
     (out.core_cycles, out.core_lines) = (*core_cycles, *core_lines);
     out

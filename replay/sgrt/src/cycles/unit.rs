@@ -3,6 +3,7 @@
 use super::batch::{Item, Pipeline};
 use super::counts::UnitCycles;
 use super::machine::Machine;
+use formats::view::Eye;
 use sim::memory::Servers;
 use std::collections::VecDeque;
 
@@ -42,6 +43,8 @@ pub struct Slot {
     pub fetched: [bool; 2],
     /// Number of rays.
     pub rays: u32,
+    /// Their eye.
+    pub eye: Eye,
     /// Cycle of acceptance.
     pub accepted: u64,
 }
@@ -140,6 +143,7 @@ impl Unit {
             from_dram: false,
             fetched: [false; 2],
             rays: item.rays,
+            eye: item.eye,
             accepted: now,
         };
         if slot == self.slots.len() {

@@ -5,8 +5,9 @@ use super::super::batch::{Batch, Item, Pipeline, Request};
 use super::super::counts::{Counts, LineCounts};
 use super::super::device::{BatchTiming, Simulated};
 use super::super::machine::{CacheSize, Machine};
+use formats::view::Eye;
 use sim::memory::TICKS;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// A cache: per set the resident lines, most recently used first, and the lines in flight in order of request.
 struct TwinCache {
@@ -14,6 +15,10 @@ struct TwinCache {
     sets: Vec<Vec<u32>>,
     in_flight: Vec<(u32, u64)>,
     queue: VecDeque<(usize, usize)>,
+    /// Prefetched lines without a request so far.
+    unused: Vec<u32>,
+    /// The last fetch of each line.
+    fetched_by: BTreeMap<u32, Eye>,
 }
 
 impl TwinCache {
@@ -23,7 +28,20 @@ impl TwinCache {
             sets: vec![Vec::new(); size.sets as usize],
             in_flight: Vec::new(),
             queue: VecDeque::new(),
+            unused: Vec::new(),
+            fetched_by: BTreeMap::new(),
         }
+    }
+
+    /// Removes a line from the unused ones: 1 if it was one.
+    fn take_unused(&mut self, line: u32) -> u64 {
+        let before = self.unused.len();
+        self.unused.retain(|other| *other != line);
+        (before - self.unused.len()) as u64
+    }
+
+    fn is_of_other(&self, line: u32, eye: Eye) -> u64 {
+        u64::from(self.fetched_by.get(&line).is_some_and(|by| *by != eye))
     }
 
     fn set(&mut self, line: u32) -> &mut Vec<u32> {
@@ -160,6 +178,9 @@ pub fn twin(machine: &Machine, batches: &[Batch]) -> Simulated {
         cycle += 1;
         assert!(cycle < 10_000_000, "the twin does not end");
     }
+    twin.last.prefetch.useless += (twin.l1.iter())
+        .map(|cache| cache.unused.len() as u64)
+        .sum::<u64>();
     twin.out.counts = twin.last;
     twin.out
 }
@@ -295,7 +316,62 @@ impl Twin<'_> {
         }
         (s.line, s.wait, s.fetched) = (0, (0, false), (false, false));
         self.counts.requests += 1;
+        let (batch, number, eye) = (&self.batches[s.batch], s.request as usize, s.item.eye);
         self.look_up(unit, slot, now);
+        for of in batch.ahead.get(number).cloned().unwrap_or(0..0) {
+            let of = batch.prefetches[of as usize];
+            for line in of.first_line..of.first_line + of.lines {
+                self.prefetch(2 * unit + of.pipeline as usize, line, eye, now);
+            }
+        }
+    }
+
+    fn prefetch(&mut self, at: usize, line: u32, eye: Eye, now: u64) {
+        let p = &mut self.counts.prefetch;
+        p.requested += 1;
+        let (l1, l2) = (&mut self.l1[at], &mut self.l2);
+        let is_resident = l1.set(line).contains(&line);
+        if is_resident || l1.arrival(line).is_some() {
+            p.held += 1;
+            p.of_other_eye += l1.is_of_other(line, eye);
+            return;
+        }
+        let is_in_l2 = l2.set(line).contains(&line) || l2.arrival(line).is_some();
+        if l1.is_full() || (!is_in_l2 && l2.is_full()) {
+            // The L2 is not asked for lines that the L1 can't take.
+            p.dropped += 1;
+            return;
+        }
+        p.issued += 1;
+        p.dram_lines += u64::from(!is_in_l2);
+        p.of_other_eye += u64::from(is_in_l2) * l2.is_of_other(line, eye);
+        p.useless += l1.take_unused(line);
+        l1.unused.push(line);
+        let data = self.fetch_l2(line, eye, now);
+        self.l1[at]
+            .in_flight
+            .push((line, data + self.machine.l2_latency));
+        self.l1[at].fetched_by.insert(line, eye);
+    }
+
+    /// The arrival of a line in the L2, which holds it or has a free MSHR.
+    fn fetch_l2(&mut self, line: u32, eye: Eye, now: u64) -> u64 {
+        if self.l2.hits(line) {
+            self.counts.l2.hits += 1;
+            return now;
+        }
+        if let Some(arrival) = self.l2.arrival(line) {
+            self.counts.l2.merged += 1;
+            return arrival;
+        }
+        let start = self.channel.max(now * TICKS);
+        self.channel = start + self.machine.dram_ticks_per_line;
+        let arrival = start.div_ceil(TICKS) + self.machine.dram_latency;
+        self.counts.l2.misses += 1;
+        self.counts.dram_lines += 1;
+        self.l2.in_flight.push((line, arrival));
+        self.l2.fetched_by.insert(line, eye);
+        arrival
     }
 
     fn queue(&mut self, unit: usize, slot: usize) {
@@ -353,10 +429,12 @@ impl Twin<'_> {
         let latency = self.machine.l2_latency;
         if l1.hits(line) {
             counts.hits += 1;
+            self.counts.prefetch.useful += l1.take_unused(line);
             return true;
         }
         if let Some(arrival) = l1.arrival(line) {
             counts.merged += 1;
+            self.counts.prefetch.late += l1.take_unused(line);
             s.wait = (s.wait.0.max(arrival), s.wait.1 || arrival - now > latency);
             return true;
         }
@@ -365,29 +443,19 @@ impl Twin<'_> {
             l1.queue.push_back((unit, slot));
             return false;
         }
-        let data = if self.l2.hits(line) {
-            self.counts.l2.hits += 1;
-            now
-        } else if let Some(arrival) = self.l2.arrival(line) {
-            self.counts.l2.merged += 1;
-            arrival
-        } else if self.l2.is_full() {
+        let is_in_l2 = self.l2.set(line).contains(&line) || self.l2.arrival(line).is_some();
+        if !is_in_l2 && self.l2.is_full() {
             self.counts.l2_mshr_waits += 1;
             self.l2.queue.push_back((unit, slot));
             return false;
-        } else {
-            let start = self.channel.max(now * TICKS);
-            self.channel = start + self.machine.dram_ticks_per_line;
-            let arrival = start.div_ceil(TICKS) + self.machine.dram_latency;
-            self.counts.l2.misses += 1;
-            self.counts.dram_lines += 1;
-            self.l2.in_flight.push((line, arrival));
-            s.fetched.1 = true;
-            arrival
-        };
+        }
         counts.misses += 1;
-        s.fetched.0 = true;
+        self.counts.prefetch.useless += l1.take_unused(line);
+        s.fetched = (true, s.fetched.1 || !is_in_l2);
+        let data = self.fetch_l2(line, s.item.eye, now);
+        let l1 = &mut self.l1[2 * unit + kind];
         l1.in_flight.push((line, data + latency));
+        l1.fetched_by.insert(line, s.item.eye);
         s.wait = (s.wait.0.max(data + latency), s.wait.1 || data > now);
         true
     }
