@@ -415,6 +415,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
             sah_cost: 61.623_411_2,
             bytes_per_node: 64,
             bytes_per_triangle: 40,
+            instances: None,
         },
         materials: vec![material("clay", false), material("chrome", true)],
         lights: vec![

@@ -195,9 +195,27 @@ pub struct BvhSummary {
     pub bytes_per_node: u32,
     /// Memory of one triangle in bytes.
     pub bytes_per_triangle: u32,
+    /// Which nodes are instances. Trees of meshes follow them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instances: Option<InstanceNodes>,
+}
+
+/// The nodes that are instances of a tree with two levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InstanceNodes {
+    /// Number of the first one.
+    pub first: u32,
+    /// How many there are.
+    pub count: u32,
 }
 
 impl BvhSummary {
+    /// Memory of all nodes and triangles in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.nodes * u64::from(self.bytes_per_node)
+            + self.triangles * u64::from(self.bytes_per_triangle)
+    }
+
     /// Byte address of a visit; nodes start at 0, and triangles follow them in leaf order.
     pub fn address(&self, visit: Visit) -> u64 {
         match visit {

@@ -59,6 +59,7 @@ pub fn bvh() -> BvhSummary {
         sah_cost: 1.0,
         bytes_per_node: 64,
         bytes_per_triangle: 48,
+        instances: None,
     }
 }
 

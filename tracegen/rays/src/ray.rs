@@ -72,6 +72,8 @@ pub struct PreparedRay<'a> {
     pub near_shift: Vec3A,
     /// Minus the origin, shifted so that slabs end later, times the far reciprocal.
     pub far_shift: Vec3A,
+    /// By axis, how much slabs are padded.
+    pub pad: Vec3A,
 }
 
 /// Axes of the sheared space, by the axis along which the direction is longest, and whether it is
@@ -88,10 +90,16 @@ const LONGEST_AXIS: [u8; 8] = [2, 2, 1, 2, 2, 0, 1, 0];
 
 impl<'a> PreparedRay<'a> {
     /// Prepares a valid ray for a scene with these bounds.
+    #[inline(always)]
+    pub fn new(ray: &'a Ray, bounds: (Vec3, Vec3)) -> Self {
+        Self::with_pad(ray, bounds, Vec3A::ZERO)
+    }
+
+    /// [`Self::new`] with slabs that are padded by more.
     ///
     /// Vector operations without branches, because a short ray spends much of its time here.
     #[inline(always)]
-    pub fn new(ray: &'a Ray, bounds: (Vec3, Vec3)) -> Self {
+    pub fn with_pad(ray: &'a Ray, bounds: (Vec3, Vec3), more: Vec3A) -> Self {
         let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
         let size = direction.abs();
         let larger = size.xyx().cmpgt(size.yzz()).bitmask();
@@ -104,7 +112,7 @@ impl<'a> PreparedRay<'a> {
             .max((origin - Vec3A::from(bounds.1)).abs());
         let reach_z = reach.to_array()[longest];
         // Twice the paper's bound, plus the rounding of the shifted origin and its product.
-        let pad = 2.0 * SLAB_EPSILON * (reach + reach_z) + 2.0 * f32::EPSILON * origin.abs();
+        let pad = 2.0 * SLAB_EPSILON * (reach + reach_z) + 2.0 * f32::EPSILON * origin.abs() + more;
         let least = Vec3A::splat(LEAST_DIRECTION);
         let direction = Vec3A::select(size.cmplt(least), least.copysign(direction), direction);
         let reciprocal = 1.0 / direction;
@@ -120,7 +128,15 @@ impl<'a> PreparedRay<'a> {
             far_reciprocal,
             near_shift: -((origin + toward) * near_reciprocal),
             far_shift: -((origin - toward) * far_reciprocal),
+            pad,
         }
+    }
+
+    /// How far a sheared coordinate moves if a vertex moves by the slabs' padding.
+    #[inline(always)]
+    pub fn sheared_pad(&self) -> f32 {
+        let [x, y, z] = self.axes.map(|axis| self.pad[axis]);
+        x.max(y) + z
     }
 
     /// Distance to a box's near plane on this axis, rounded towards an earlier entry.
@@ -161,6 +177,31 @@ impl<'a> PreparedRay<'a> {
     /// passes between them.
     #[inline]
     pub fn line_hits(&self, v: &[[f32; 3]; 3]) -> bool {
+        let [a, b, c] = self.sheared(v);
+        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            return line_hits_sheared_f64(a, b, c);
+        }
+        (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)
+    }
+
+    /// True if the line would pass through the triangle after moving each sheared vertex by at
+    /// most so much.
+    #[inline]
+    pub fn line_nears(&self, v: &[[f32; 3]; 3], sheared_pad: f32) -> bool {
+        let [a, b, c] = self.sheared(v);
+        let size = [a, b, c]
+            .as_flattened()
+            .iter()
+            .fold(0.0, |size: f32, x| size.max(x.abs()));
+        let margin = near_margin(size, sheared_pad);
+        let edges = [edge(c, b), edge(a, c), edge(b, a)];
+        edges.iter().all(|e| *e >= -margin) || edges.iter().all(|e| *e <= margin)
+    }
+
+    /// The vertices in the sheared space, in which the ray goes along the last axis.
+    #[inline]
+    fn sheared(&self, v: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
         let [kx, ky, kz] = self.axes;
         let [sx, sy] = self.shear;
         let o = self.ray.origin.to_array();
@@ -168,13 +209,7 @@ impl<'a> PreparedRay<'a> {
             let z = p[kz] - o[kz];
             [(p[kx] - o[kx]) - sx * z, (p[ky] - o[ky]) - sy * z]
         };
-        let [a, b, c] = [sheared(&v[0]), sheared(&v[1]), sheared(&v[2])];
-        let edge = |p: [f32; 2], q: [f32; 2]| p[0] * q[1] - p[1] * q[0];
-        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            return line_hits_sheared_f64(a, b, c);
-        }
-        (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)
+        [sheared(&v[0]), sheared(&v[1]), sheared(&v[2])]
     }
 
     /// Distance to a triangle whose line test passed, or `None` if it is outside the segment.
@@ -210,6 +245,19 @@ impl<'a> PreparedRay<'a> {
         let t = normal.dot(v0 - self.ray.origin.as_dvec3()) / slope;
         t.is_finite().then(|| (t as f32).clamp(near, far))
     }
+}
+
+/// An edge function of the sheared space.
+#[inline]
+fn edge(p: [f32; 2], q: [f32; 2]) -> f32 {
+    p[0] * q[1] - p[1] * q[0]
+}
+
+/// Bound of an edge function's change if coordinates of at most `size` move by `pad`, and of its
+/// rounding.
+#[inline]
+pub fn near_margin(size: f32, pad: f32) -> f32 {
+    4.0 * (size + pad) * (pad + f32::EPSILON * size)
 }
 
 fn to_f64(p: [f32; 3]) -> DVec3 {

@@ -1,6 +1,8 @@
 //! The tracer on a small scene with every kind of material.
 
 mod columns;
+#[allow(dead_code)]
+mod instances;
 mod lighting;
 // The benches include these files, and use more of them than the tests do.
 #[allow(dead_code)]

@@ -125,7 +125,7 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn lines_hit(ray: &Ray, block: &Block) -> u32 {
+    fn lines_hit<const NEAR: bool>(ray: &Ray, block: &Block, pad: f32) -> u32 {
         let [kx, ky, kz] = ray.sheared_at;
         // SAFETY: dispatch ensures AVX2. Loads are of whole arrays.
         unsafe {
@@ -148,6 +148,23 @@ impl Kernel for Avx2 {
             let zero = _mm_setzero_ps();
             let least = _mm_min_ps(_mm_min_ps(u, v), w);
             let most = _mm_max_ps(_mm_max_ps(u, v), w);
+            if NEAR {
+                let sign = _mm_set1_ps(-0.0);
+                let size = [ay, bx, by, cx, cy]
+                    .into_iter()
+                    .fold(_mm_andnot_ps(sign, ax), |size, x| {
+                        _mm_max_ps(size, _mm_andnot_ps(sign, x))
+                    });
+                let pad = _mm_set1_ps(pad);
+                let both = _mm_add_ps(pad, _mm_mul_ps(_mm_set1_ps(f32::EPSILON), size));
+                let sum = _mm_mul_ps(_mm_set1_ps(4.0), _mm_add_ps(size, pad));
+                let margin = _mm_mul_ps(sum, both);
+                let inside = _mm_or_ps(
+                    _mm_cmpge_ps(least, _mm_xor_ps(sign, margin)),
+                    _mm_cmple_ps(most, margin),
+                );
+                return _mm_movemask_ps(inside) as u32;
+            }
             let all = _mm_or_ps(_mm_cmpgt_ps(least, zero), _mm_cmplt_ps(most, zero));
             let mut mask = _mm_movemask_ps(all) as u32;
             // A lane whose product is zero has a zero edge function, which is evaluated exactly.
@@ -208,7 +225,7 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
+    fn leaf_out_of_line<C: Counter, L: LeafTest<Self>>(
         test: &mut L,
         ray: &Ray,
         counter: &mut C,
@@ -238,7 +255,7 @@ unsafe fn eight(v: Vec3A) -> [__m256; 3] {
 
 #[target_feature(enable = "avx2,fma")]
 #[inline(never)]
-fn leaf_out_of_line<C: Counter, L: LeafTest<Avx2, C>>(
+fn leaf_out_of_line<C: Counter, L: LeafTest<Avx2>>(
     test: &mut L,
     ray: &Ray,
     counter: &mut C,

@@ -57,7 +57,8 @@ pub fn settings() -> Vec<(String, String)> {
 }
 
 /// A tree in obvhs's format, in which the children of every inner node are adjacent.
-pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
+/// Leaves have up to `most` triangles.
+pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]], most: u32) -> Bvh2 {
     let boxes: Vec<Aabb> = triangles
         .iter()
         .map(|t| {
@@ -65,7 +66,10 @@ pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
             Aabb::new(a.min(b).min(c), a.max(b).max(c))
         })
         .collect();
-    let mut tree = collapse(&build_bvh2(&boxes, SETTINGS, &mut Duration::default()));
+    let mut tree = collapse(
+        &build_bvh2(&boxes, SETTINGS, &mut Duration::default()),
+        most,
+    );
     let mut optimizer = ReinsertionOptimizer::default();
     for _ in 0..REINSERTIONS_AFTER_COLLAPSE {
         optimizer.run(&mut tree, 1.0, None);

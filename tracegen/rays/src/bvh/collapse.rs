@@ -10,13 +10,13 @@ pub(super) const MAX_TRIANGLES: u32 = 2 * BLOCK as u32;
 /// leaf's cost is per block. The collapse in obvhs counts it per triangle.
 pub(super) const BLOCK_COST: f32 = 1.0;
 
-/// The tree with cheap subtrees replaced by leaves.
-pub(super) fn collapse(tree: &Bvh2) -> Bvh2 {
+/// The tree with cheap subtrees of up to `most` triangles replaced by leaves.
+pub(super) fn collapse(tree: &Bvh2, most: u32) -> Bvh2 {
     let Some(root) = tree.nodes.first() else {
         return Bvh2::default();
     };
     let order = parents_first(tree);
-    let is_leaf = choose_leaves(tree, &order);
+    let is_leaf = choose_leaves(tree, &order, most);
     let mut out = Bvh2 {
         nodes: vec![*root],
         ..Bvh2::default()
@@ -56,7 +56,7 @@ pub(super) fn parents_first(tree: &Bvh2) -> Vec<usize> {
 }
 
 /// Chooses bottom up whether keeping a node or making it a leaf is cheaper.
-fn choose_leaves(tree: &Bvh2, parents_first: &[usize]) -> Vec<bool> {
+fn choose_leaves(tree: &Bvh2, parents_first: &[usize], most: u32) -> Vec<bool> {
     let mut triangles = vec![0u32; tree.nodes.len()];
     let mut cost = vec![0.0f32; tree.nodes.len()];
     let mut is_leaf = vec![false; tree.nodes.len()];
@@ -72,7 +72,7 @@ fn choose_leaves(tree: &Bvh2, parents_first: &[usize]) -> Vec<bool> {
             cost[at] = area + cost[left] + cost[right];
         }
         let as_leaf = area * BLOCK_COST * triangles[at].div_ceil(BLOCK as u32) as f32;
-        if triangles[at] <= MAX_TRIANGLES && as_leaf <= cost[at] {
+        if triangles[at] <= most && as_leaf <= cost[at] {
             is_leaf[at] = true;
             cost[at] = as_leaf;
         }

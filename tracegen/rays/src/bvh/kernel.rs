@@ -20,8 +20,9 @@ pub trait Kernel: Copy + Sized {
     fn step2(ray: &Self::Ray<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32);
     /// The eight-box test: entry distances into `near`, and a bit for each child that is hit.
     fn step8(ray: &Self::Ray<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32;
-    /// A bit mask of a block's triangles through which the line passes.
-    fn lines_hit(ray: &Self::Ray<'_>, block: &Block) -> u32;
+    /// A bit mask of a block's triangles through which the line passes, with `NEAR` also of those
+    /// that it would pass through after moving sheared vertices by at most `pad`.
+    fn lines_hit<const NEAR: bool>(ray: &Self::Ray<'_>, block: &Block, pad: f32) -> u32;
     /// Entries and exits of the boxes of a block's triangles, and a bit mask of those whose box is
     /// on the segment up to `t_max`.
     fn boxes_hit(ray: &Self::Ray<'_>, block: &Block, t_max: f32, ends: &mut Ends) -> u32;
@@ -30,7 +31,7 @@ pub trait Kernel: Copy + Sized {
     fn load_ahead(_: *const i8) {}
     /// Calls a leaf test as a separate function, so that a small loop around it keeps its
     /// registers.
-    fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
+    fn leaf_out_of_line<C: Counter, L: LeafTest<Self>>(
         test: &mut L,
         ray: &Self::Ray<'_>,
         counter: &mut C,
@@ -95,10 +96,16 @@ impl Kernel for Scalar {
     }
 
     #[inline]
-    fn lines_hit(ray: &PreparedRay<'_>, block: &Block) -> u32 {
-        (0..BLOCK)
-            .map(|lane| u32::from(ray.line_hits(&block.triangle(lane))) << lane)
-            .sum()
+    fn lines_hit<const NEAR: bool>(ray: &PreparedRay<'_>, block: &Block, pad: f32) -> u32 {
+        let hit = |lane| {
+            let vertices = block.triangle(lane);
+            if NEAR {
+                ray.line_nears(&vertices, pad)
+            } else {
+                ray.line_hits(&vertices)
+            }
+        };
+        (0..BLOCK).map(|lane| u32::from(hit(lane)) << lane).sum()
     }
 
     #[inline]

@@ -23,8 +23,11 @@ pub struct RayHit {
 impl Bvh {
     /// Slot of a triangle that was hit, its place in the order of a tree's leaves.
     pub fn slot(&self, tree: TraversalKind, hit: &RayHit) -> u32 {
-        let (block, lane) = (hit.place as usize / BLOCK, hit.place % BLOCK as u32);
-        self.slots_of(tree)[block] + lane
+        let (block, lane) = (hit.place / BLOCK as u32, hit.place % BLOCK as u32);
+        match &self.below {
+            None => self.slots_of(tree)[block as usize] + lane,
+            Some(below) => below.slot(tree, block) + lane,
+        }
     }
 }
 
@@ -32,6 +35,12 @@ impl Bvh {
 pub trait AlphaTest {
     /// True if the triangle is opaque at these weights of its second and third vertex.
     fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool;
+}
+
+impl AlphaTest for &dyn AlphaTest {
+    fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
+        (**self).opaque(primitive, bary)
+    }
 }
 
 /// Treats every triangle as opaque.
@@ -47,29 +56,113 @@ impl AlphaTest for AllOpaque {
 
 /// The test at a leaf. It is a trait rather than a closure, because a closure that is not inlined
 /// would be compiled without the instructions of its traversal.
-pub trait LeafTest<K: Kernel, C: Counter> {
+pub trait LeafTest<K: Kernel> {
+    /// Whether the test is too long to be inlined into any traversal.
+    const LONG: bool = false;
     /// Tests a leaf and returns the new `t_max`, or `None` to stop.
-    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32>;
+    fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32>;
+    /// Told before each test how many entries are on the stack.
+    #[inline(always)]
+    fn stacked(&mut self, entries: u32) {
+        let _ = entries;
+    }
+}
+
+/// Where the triangles of a tree are.
+pub(super) trait Place {
+    /// Added to the numbers of primitives.
+    fn first_primitive(&self) -> u32;
+    /// Added to the numbers of blocks.
+    fn first_block(&self) -> u32;
+    /// A bit mask of a block's triangles that the line may hit.
+    fn lines_hit<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block) -> u32;
+    /// A triangle of that mask in the world, and the ends of its box, if the ray hits it.
+    fn triangle(
+        &self,
+        ray: &PreparedRay<'_>,
+        vertices: [[f32; 3]; 3],
+        ends: [f32; 2],
+    ) -> Option<([[f32; 3]; 3], [f32; 2])>;
+}
+
+/// Triangles in the world.
+pub(super) struct InPlace;
+
+impl Place for InPlace {
+    #[inline(always)]
+    fn first_primitive(&self) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn first_block(&self) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn lines_hit<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block) -> u32 {
+        K::lines_hit::<false>(ray, block, 0.0)
+    }
+
+    #[inline(always)]
+    fn triangle(
+        &self,
+        _: &PreparedRay<'_>,
+        vertices: [[f32; 3]; 3],
+        ends: [f32; 2],
+    ) -> Option<([[f32; 3]; 3], [f32; 2])> {
+        Some((vertices, ends))
+    }
 }
 
 /// What both leaf tests need.
-pub(super) struct Query<'a, A> {
+pub(super) struct Query<'a, A, P> {
     pub bvh: &'a Bvh,
     pub first_slots: &'a [u32],
     pub prepared: &'a PreparedRay<'a>,
     pub alpha: &'a A,
+    pub place: P,
 }
 
-impl<A: AlphaTest> Query<'_, A> {
+impl<'a, A, P> Query<'a, A, P> {
+    /// Goes on in another tree.
+    #[inline(always)]
+    pub fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: P) {
+        (self.bvh, self.first_slots, self.place) = (bvh, first_slots, place);
+    }
+}
+
+impl<A: AlphaTest, P: Place> Query<'_, A, P> {
     /// The triangles of a block that the ray may hit up to `t_max`, and the ends of their boxes.
     #[inline(always)]
     fn candidates<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block, t_max: f32) -> (u32, Ends) {
         let mut ends = Ends([[0.0; BLOCK]; 2]);
-        let mut mask = K::lines_hit(ray, block);
+        let mut mask = self.place.lines_hit::<K>(ray, block);
         if mask != 0 {
             mask &= K::boxes_hit(ray, block, t_max, &mut ends);
         }
         (mask, ends)
+    }
+
+    /// Distance and vertices of a candidate, if the ray hits it.
+    #[inline(always)]
+    fn hit(&self, block: &Block, lane: usize, ends: &Ends) -> Option<(f32, [[f32; 3]; 3])> {
+        let ends = ends.0.map(|end| end[lane]);
+        let (vertices, [near, far]) =
+            (self.place).triangle(self.prepared, block.triangle(lane), ends)?;
+        let t = self.prepared.distance_within(&vertices, near, far)?;
+        Some((t, vertices))
+    }
+
+    #[inline(always)]
+    fn primitive(&self, block: &Block, lane: usize) -> u32 {
+        self.place.first_primitive() + (block.primitives[lane] & !MASKED)
+    }
+
+    /// [`RayHit::place`] of a triangle.
+    #[inline(always)]
+    fn place(&self, block: u32, lane: usize) -> u32 {
+        (self.place.first_block() + block) * BLOCK as u32 + lane as u32
     }
 
     /// True if a masked triangle stops the ray.
@@ -80,8 +173,8 @@ impl<A: AlphaTest> Query<'_, A> {
     }
 }
 
-pub(super) struct Closest<'a, A> {
-    query: Query<'a, A>,
+pub(super) struct Closest<'a, A, P> {
+    pub query: Query<'a, A, P>,
     /// The nearest hit. Before the first, the end of the ray and [`NO_PRIMITIVE`].
     best: RayHit,
 }
@@ -89,8 +182,8 @@ pub(super) struct Closest<'a, A> {
 /// Above the numbers of all primitives.
 const NO_PRIMITIVE: u32 = u32::MAX;
 
-impl<'a, A: AlphaTest> Closest<'a, A> {
-    pub fn new(query: Query<'a, A>) -> Self {
+impl<'a, A: AlphaTest, P: Place> Closest<'a, A, P> {
+    pub fn new(query: Query<'a, A, P>) -> Self {
         Self {
             best: RayHit {
                 t: query.prepared.ray.t_max,
@@ -107,9 +200,9 @@ impl<'a, A: AlphaTest> Closest<'a, A> {
     }
 }
 
-impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
+impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for Closest<'_, A, P> {
     #[inline(always)]
-    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
+    fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
         let query = &self.query;
         let (first, count) = leaf.leaf_range();
         let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
@@ -119,12 +212,10 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                let [near, far] = ends.0.map(|end| end[lane]);
-                let Some(t) = query.prepared.distance_within(&vertices, near, far) else {
+                let Some((t, vertices)) = query.hit(block, lane, &ends) else {
                     continue;
                 };
-                let primitive = block.primitives[lane] & !MASKED;
+                let primitive = query.primitive(block, lane);
                 if t <= query.prepared.ray.t_min
                     || (t, primitive) >= (self.best.t, self.best.primitive)
                 {
@@ -138,7 +229,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
                     t,
                     primitive,
                     vertices,
-                    place: number * BLOCK as u32 + lane as u32,
+                    place: query.place(number, lane),
                 };
             }
         }
@@ -146,13 +237,13 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
     }
 }
 
-pub(super) struct AnyHit<'a, A> {
-    query: Query<'a, A>,
+pub(super) struct AnyHit<'a, A, P> {
+    pub query: Query<'a, A, P>,
     blocker: Option<RayHit>,
 }
 
-impl<'a, A: AlphaTest> AnyHit<'a, A> {
-    pub fn new(query: Query<'a, A>) -> Self {
+impl<'a, A: AlphaTest, P: Place> AnyHit<'a, A, P> {
+    pub fn new(query: Query<'a, A, P>) -> Self {
         Self {
             query,
             blocker: None,
@@ -164,9 +255,9 @@ impl<'a, A: AlphaTest> AnyHit<'a, A> {
     }
 }
 
-impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
+impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for AnyHit<'_, A, P> {
     #[inline(always)]
-    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
+    fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
         let query = &self.query;
         let Ray { t_min, t_max, .. } = *query.prepared.ray;
         let (first, count) = leaf.leaf_range();
@@ -177,15 +268,13 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                let [near, far] = ends.0.map(|end| end[lane]);
-                let Some(t) = query.prepared.distance_within(&vertices, near, far) else {
+                let Some((t, vertices)) = query.hit(block, lane, &ends) else {
                     continue;
                 };
                 if t <= t_min || t > t_max {
                     continue;
                 }
-                let primitive = block.primitives[lane] & !MASKED;
+                let primitive = query.primitive(block, lane);
                 let masked = block.primitives[lane] & MASKED != 0;
                 if masked && !query.opaque(counter, primitive, &vertices) {
                     continue;
@@ -195,7 +284,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
                     t,
                     primitive,
                     vertices,
-                    place: (first + number as u32) * BLOCK as u32 + lane as u32,
+                    place: query.place(first + number as u32, lane),
                 });
                 return None;
             }

@@ -12,6 +12,7 @@ mod collapse;
 mod compress;
 mod contents;
 pub mod count;
+mod instances;
 mod kernel;
 mod leaf;
 pub mod node;
@@ -26,9 +27,12 @@ mod widen;
 mod tests;
 
 use crate::ray::{LARGEST_COORDINATE, Ray};
+use collapse::MAX_TRIANGLES;
 use count::Counter;
-use formats::raytrace::{BvhSummary, TraversalKind};
+use formats::raytrace::{BvhSummary, InstanceNodes, TraversalKind};
 use glam::Vec3;
+use instances::Below;
+pub use instances::Placement;
 use kernel::Scalar;
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
@@ -37,7 +41,7 @@ use on_demand::{OnDemandTree, node_bytes};
 use pages::in_large_pages;
 use stacks::Stacks;
 pub use traverse::TraversalStack;
-use traverse::{Two, Wide, Width, search};
+use traverse::{Two, Wide, Width, search, search_below};
 use treelets::in_treelets;
 use widen::MAX_WIDTH;
 
@@ -93,6 +97,8 @@ pub struct Bvh {
     stack_size: usize,
     sah_cost: f64,
     instructions: Instructions,
+    /// What the leaves are if they are not triangles.
+    below: Option<Box<Below>>,
 }
 
 impl Bvh {
@@ -118,6 +124,18 @@ impl Bvh {
         triangles: &[[[f32; 3]; 3]],
         masked: impl Fn(u32) -> bool,
     ) -> Result<Self, BvhError> {
+        let number = |n| if masked(n) { n | MASKED } else { n };
+        Self::build_with(options, triangles, number, MAX_TRIANGLES)
+    }
+
+    /// [`Self::build_for`], with the number and mask flag of each triangle, ascending, and the most
+    /// triangles of a leaf.
+    fn build_with(
+        options: TreeOptions,
+        triangles: &[[[f32; 3]; 3]],
+        number: impl Fn(u32) -> u32,
+        most: u32,
+    ) -> Result<Self, BvhError> {
         let limit = Child::MAX_BLOCKS as usize;
         if triangles.len() > limit {
             return Err(BvhError::TooManyTriangles {
@@ -133,16 +151,16 @@ impl Bvh {
                     .iter()
                     .all(|x| x.abs() <= LARGEST_COORDINATE)
             })
-            .map(|(t, n)| (*t, if masked(n) { n | MASKED } else { n }))
+            .map(|(t, n)| (*t, number(n)))
             .unzip();
         let points = || kept.iter().flatten().map(|p| Vec3::from(*p));
         let bounds = points()
             .map(|p| (p, p))
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
             .unwrap_or_default();
-        let stacks = Stacks::find(&kept, &numbers);
+        let stacks = Stacks::find(&kept, &numbers, most as usize);
         let built: Vec<_> = stacks.built.iter().map(|at| kept[*at as usize]).collect();
-        let mut tree = build::build_binary(&built);
+        let mut tree = build::build_binary(&built, most);
         stacks.expand(&mut tree, &kept);
         let mut layout = build::lay_out(&tree, &kept, &numbers);
         let (mut nodes8, depth8) = build::emit_wide(&tree, &layout.children, MAX_WIDTH);
@@ -174,6 +192,7 @@ impl Bvh {
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
+            below: None,
         })
     }
 
@@ -203,15 +222,61 @@ impl Bvh {
         }
     }
 
-    /// Summary of the tree for a trace.
-    pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
-        let (nodes, depth) = match traversal {
+    /// Nodes of a tree without what is below, and its depth.
+    fn size(&self, kind: TraversalKind) -> (u64, u32) {
+        let (nodes, depth) = match kind {
             TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2),
             TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8),
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
                 (self.on_demand.nodes.len(), self.on_demand.depth)
             }
         };
+        (nodes as u64, depth)
+    }
+
+    /// Bytes of the hierarchy in this process, with all its trees.
+    pub fn host_bytes(&self) -> usize {
+        fn bytes<T>(of: &[T]) -> usize {
+            size_of_val(of)
+        }
+        let slots = bytes(&self.first_slots) + bytes(&self.on_demand.first_slots);
+        let wide = bytes(&self.nodes8) + bytes(&self.on_demand.nodes);
+        let below = self.below.as_ref().map_or(0, |below| {
+            let trees: usize = below.trees.iter().map(|tree| tree.bvh.host_bytes()).sum();
+            trees + bytes(&below.instances)
+        });
+        bytes(&self.nodes2) + wide + bytes(&self.blocks) + slots + below
+    }
+
+    /// Summary of the tree for a trace.
+    pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
+        let mut summary = self.own_summary(traversal);
+        let Some(below) = &self.below else {
+            return summary;
+        };
+        let instances = summary.triangles;
+        let trees: Vec<_> = (below.trees.iter())
+            .map(|tree| tree.bvh.own_summary(traversal))
+            .collect();
+        let sum = |of: fn(&BvhSummary) -> u64| trees.iter().map(of).sum::<u64>();
+        summary
+            .settings
+            .push(("trees".to_owned(), trees.len().to_string()));
+        summary.instances = Some(InstanceNodes {
+            first: summary.nodes as u32,
+            count: instances as u32,
+        });
+        summary.nodes += instances + sum(|tree| tree.nodes);
+        summary.triangles = sum(|tree| tree.triangles);
+        summary.leaves = sum(|tree| tree.leaves);
+        summary.depth += 1 + trees.iter().map(|tree| tree.depth).max().unwrap_or(0);
+        summary.sah_cost += below.sah_cost;
+        summary
+    }
+
+    /// [`Self::summary`] without what is below.
+    fn own_summary(&self, traversal: TraversalKind) -> BvhSummary {
+        let (nodes, depth) = self.size(traversal);
         let mut settings = build::settings();
         let treelets = self
             .treelet_bytes
@@ -222,12 +287,13 @@ impl Bvh {
             settings,
             traversal,
             triangles: self.triangles,
-            nodes: nodes as u64,
+            nodes,
             leaves: self.leaves,
             depth,
             sah_cost: self.sah_cost,
             bytes_per_node: node_bytes(traversal) as u32,
             bytes_per_triangle: TRIANGLE_BYTES,
+            instances: None,
         }
     }
 
@@ -292,15 +358,37 @@ impl Bvh {
         if self.nodes2.is_empty() || !ray.is_valid() {
             return None;
         }
-        match self.instructions {
+        match (self.instructions, &self.below) {
             #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => {
-                // SAFETY: `instructions` is Avx2 only if the processor has it.
-                unsafe { search_avx2::<ANY_HIT, W, C, A>(self, ray, stack, counter, alpha) }
+            // SAFETY: `instructions` is Avx2 only if the processor has it.
+            (Instructions::Avx2, below) => unsafe {
+                match below {
+                    None => search_avx2::<ANY_HIT, W, C, A>(self, ray, stack, counter, alpha),
+                    Some(below) => {
+                        search_below_avx2::<ANY_HIT, W, C>(self, below, ray, stack, counter, alpha)
+                    }
+                }
+            },
+            (_, None) => search::<ANY_HIT, Scalar, W, C, A>(self, ray, stack, counter, alpha),
+            (_, Some(below)) => {
+                search_below::<ANY_HIT, Scalar, W, C>(self, below, ray, stack, counter, alpha)
             }
-            _ => search::<ANY_HIT, Scalar, W, C, A>(self, ray, stack, counter, alpha),
         }
     }
+}
+
+/// [`search_avx2`] for trees of instances.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn search_below_avx2<const ANY_HIT: bool, W: Width, C: Counter>(
+    bvh: &Bvh,
+    below: &Below,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &dyn AlphaTest,
+) -> Option<RayHit> {
+    search_below::<ANY_HIT, avx2::Avx2, W, C>(bvh, below, ray, stack, counter, alpha)
 }
 
 /// The traversal compiled for AVX2. Compiled for the baseline instruction set, the kernel runs at

@@ -6,7 +6,6 @@
 //! one of a stack are left out: of equally near hits the lowest number counts, so no ray can end at
 //! them.
 
-use super::collapse::MAX_TRIANGLES;
 use super::node::MASKED;
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -22,6 +21,8 @@ pub(super) struct Stacks {
     /// Stacks too large for a leaf: the built triangle that represents each, ascending, and the
     /// positions of all triangles of the stack at which a ray can end.
     stacks: Vec<(u32, Vec<u32>)>,
+    /// Most triangles of a leaf.
+    most: usize,
 }
 
 /// The bits of a triangle's coordinates.
@@ -42,8 +43,7 @@ fn hash(triangle: &Vertices) -> u64 {
 
 impl Stacks {
     /// Finds the stacks. `numbers` are primitive numbers, ascending, with their mask flags.
-    pub fn find(triangles: &[Vertices], numbers: &[u32]) -> Self {
-        let most = MAX_TRIANGLES as usize;
+    pub fn find(triangles: &[Vertices], numbers: &[u32], most: usize) -> Self {
         let mut hashes: Vec<(u64, u32)> = triangles.iter().map(hash).zip(0..).collect();
         hashes.sort_unstable();
         let mut left_out = vec![false; triangles.len()];
@@ -81,7 +81,11 @@ impl Stacks {
             *stands_for = built.partition_point(|at| at < stands_for) as u32;
         }
         stacks.sort_unstable();
-        Self { built, stacks }
+        Self {
+            built,
+            stacks,
+            most,
+        }
     }
 
     /// Converts a tree over the built triangles into one over all triangles at which a ray can end.
@@ -106,14 +110,14 @@ impl Stacks {
                     None => members.push(self.built[one as usize]),
                 }
             }
-            subtree(tree, at, &members, triangles);
+            subtree(tree, at, &members, triangles, self.most);
         }
     }
 }
 
 /// Places members below a node, halved until they fit into a leaf.
-fn subtree(tree: &mut Bvh2, at: usize, members: &[u32], triangles: &[Vertices]) {
-    if members.len() <= MAX_TRIANGLES as usize {
+fn subtree(tree: &mut Bvh2, at: usize, members: &[u32], triangles: &[Vertices], most: usize) {
+    if members.len() <= most {
         let first = tree.primitive_indices.len();
         tree.primitive_indices.extend(members);
         let aabb = *tree.nodes[at].aabb();
@@ -134,8 +138,8 @@ fn subtree(tree: &mut Bvh2, at: usize, members: &[u32], triangles: &[Vertices]) 
     }
     let aabb = *tree.nodes[at].aabb();
     tree.nodes[at] = Bvh2Node::new(aabb, 0, first as u32);
-    subtree(tree, first, halves.0, triangles);
-    subtree(tree, first + 1, halves.1, triangles);
+    subtree(tree, first, halves.0, triangles, most);
+    subtree(tree, first + 1, halves.1, triangles, most);
 }
 
 #[cfg(test)]
@@ -170,7 +174,7 @@ mod tests {
         for count in [16_000, 64_000] {
             let triangles = vec![ACROSS; count];
             let numbers: Vec<u32> = (0..count as u32).collect();
-            assert_eq!(Stacks::find(&triangles, &numbers).built, [0]);
+            assert_eq!(Stacks::find(&triangles, &numbers, 8).built, [0]);
             let bvh = Bvh::build(&triangles, |_| false).unwrap();
             for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
                 let (found, counts) = hit(&bvh, tree, &Only(0));
@@ -188,7 +192,7 @@ mod tests {
             triangles.push(ACROSS.map(|[x, y, _]| [x, y, -1.0]));
             let masked = |number| number < count;
             let numbers: Vec<u32> = (0..count).map(|n| n | MASKED).chain([count]).collect();
-            assert_eq!(Stacks::find(&triangles, &numbers).built, [0, count]);
+            assert_eq!(Stacks::find(&triangles, &numbers, 8).built, [0, count]);
             let bvh = Bvh::build(&triangles, masked).unwrap();
             for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
                 for only in [0, 1, 777, count - 1] {
@@ -218,6 +222,6 @@ mod tests {
     #[test]
     fn triangles_that_fit_into_a_leaf_are_not_a_stack() {
         let numbers: Vec<u32> = (0..8).collect();
-        assert_eq!(Stacks::find(&[ACROSS; 8], &numbers).built, numbers);
+        assert_eq!(Stacks::find(&[ACROSS; 8], &numbers, 8).built, numbers);
     }
 }

@@ -2,8 +2,9 @@
 
 use super::Bvh;
 use super::count::Counter;
+use super::instances::{Below, Enter, Moved};
 use super::kernel::{Kernel, Lanes8};
-use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, Query, RayHit};
+use super::leaf::{AlphaTest, AnyHit, Closest, InPlace, LeafTest, Query, RayHit};
 use super::node::{Child, Node8};
 use crate::ray::{PreparedRay, Ray};
 
@@ -13,6 +14,8 @@ pub struct TraversalStack {
     /// Entry distance in the upper half (its bits sort like the number, because it is not
     /// negative), child in the lower half.
     entries: Vec<u64>,
+    /// The same of the tree of an instance.
+    below: Vec<u64>,
 }
 
 impl TraversalStack {
@@ -20,15 +23,16 @@ impl TraversalStack {
     pub fn new(capacity: usize) -> Self {
         Self {
             entries: vec![0; capacity],
+            below: Vec::new(),
         }
     }
+}
 
-    /// Not inlined, because it happens once a thread.
-    #[cold]
-    #[inline(never)]
-    fn grow(&mut self, capacity: usize) {
-        self.entries.resize(capacity, 0);
-    }
+/// Not inlined, because it happens once a thread.
+#[cold]
+#[inline(never)]
+fn grow(stack: &mut Vec<u64>, capacity: usize) {
+    stack.resize(capacity, 0);
 }
 
 /// A stack entry. `near` must not be negative.
@@ -47,6 +51,8 @@ pub trait Width {
     /// Whether leaf tests are separate functions. The loop of the binary tree is then short enough
     /// to stay in registers. That of the eight-wide tree is not, and the call only costs time.
     const LEAVES_OUT_OF_LINE: bool;
+    /// Its place in [`Lower::first_nodes`](super::instances::Lower).
+    const NUMBER: usize;
 
     /// By block, the slot of its first triangle.
     fn first_slots(bvh: &Bvh) -> &[u32];
@@ -67,6 +73,7 @@ pub struct Two;
 
 impl Width for Two {
     const LEAVES_OUT_OF_LINE: bool = true;
+    const NUMBER: usize = 0;
 
     #[inline(always)]
     fn first_slots(bvh: &Bvh) -> &[u32] {
@@ -142,6 +149,7 @@ pub struct Wide<const ON_DEMAND: bool>;
 
 impl<const ON_DEMAND: bool> Width for Wide<ON_DEMAND> {
     const LEAVES_OUT_OF_LINE: bool = false;
+    const NUMBER: usize = 1 + ON_DEMAND as usize;
 
     #[inline(always)]
     fn first_slots(bvh: &Bvh) -> &[u32] {
@@ -228,33 +236,30 @@ impl<const ON_DEMAND: bool> Width for Wide<ON_DEMAND> {
     }
 }
 
-/// Traverses a tree from the root.
+/// Traverses a tree from the root. Returns the last `t_max`, or `None` if a leaf test stopped.
 #[inline(always)]
-fn walk<K: Kernel, W: Width, C: Counter>(
+pub(super) fn walk<K: Kernel, W: Width, C: Counter, L: LeafTest<K>>(
     bvh: &Bvh,
     ray: &K::Ray<'_>,
     mut t_max: f32,
-    stack: &mut TraversalStack,
+    stack: &mut Vec<u64>,
     counter: &mut C,
-    leaf: &mut impl LeafTest<K, C>,
-) {
-    if stack.entries.len() < bvh.stack_size {
-        stack.grow(bvh.stack_size);
+    leaf: &mut L,
+) -> Option<f32> {
+    if stack.len() < bvh.stack_size {
+        grow(stack, bvh.stack_size);
     }
-    let entries = &mut stack.entries[..];
+    let entries = &mut stack[..];
     let mut top = 0;
     let mut at = Child(0);
     loop {
         let next = if at.is_leaf() {
-            let tested = if W::LEAVES_OUT_OF_LINE {
-                K::leaf_out_of_line(leaf, ray, counter, at)
+            leaf.stacked(top as u32);
+            t_max = if W::LEAVES_OUT_OF_LINE || L::LONG {
+                K::leaf_out_of_line(leaf, ray, counter, at)?
             } else {
-                leaf.test(ray, counter, at)
+                leaf.test(ray, counter, at)?
             };
-            match tested {
-                Some(shorter) => t_max = shorter,
-                None => return,
-            }
             None
         } else {
             counter.step(at.0);
@@ -266,7 +271,7 @@ fn walk<K: Kernel, W: Width, C: Counter>(
             Some(child) => child,
             None => loop {
                 if top == 0 {
-                    return;
+                    return Some(t_max);
                 }
                 top -= 1;
                 let (near, child) = unpack(entries[top]);
@@ -295,14 +300,48 @@ pub(super) fn search<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter, A: Al
         first_slots: W::first_slots(bvh),
         prepared: &prepared,
         alpha,
+        place: InPlace,
     };
+    let entries = &mut stack.entries;
     if ANY_HIT {
         let mut leaf = AnyHit::new(query);
-        walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+        walk::<K, W, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut leaf);
         leaf.hit()
     } else {
         let mut leaf = Closest::new(query);
-        walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+        walk::<K, W, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut leaf);
         leaf.hit()
+    }
+}
+
+/// [`search`] in the trees of instances, whose boxes are in the tree `bvh`. It is compiled for all alpha
+/// tests at once, because it is long.
+#[inline(always)]
+pub(super) fn search_below<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter>(
+    bvh: &Bvh,
+    below: &Below,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &dyn AlphaTest,
+) -> Option<RayHit> {
+    let prepared = PreparedRay::new(ray, bvh.bounds);
+    let loaded = K::load(&prepared);
+    let query = Query {
+        bvh,
+        first_slots: W::first_slots(bvh),
+        prepared: &prepared,
+        alpha: &alpha,
+        place: Moved::nowhere(below),
+    };
+    let (entries, inner) = (&mut stack.entries, &mut stack.below);
+    if ANY_HIT {
+        let mut enter = Enter::<W, _>::new(below, &prepared, inner, AnyHit::new(query));
+        walk::<K, W, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
+        enter.search.hit()
+    } else {
+        let mut enter = Enter::<W, _>::new(below, &prepared, inner, Closest::new(query));
+        walk::<K, W, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
+        enter.search.hit()
     }
 }

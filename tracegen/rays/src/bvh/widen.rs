@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn the_cost_is_below_that_of_greedy_opening_and_leaves_are_kept() {
         for mesh in [TestMesh::torus(160, 80), TestMesh::sphere(4)] {
-            let tree = build_binary(&mesh.rounded(DVec3::ZERO));
+            let tree = build_binary(&mesh.rounded(DVec3::ZERO), 8);
             for (width, most) in [(4, 0.99), (8, 0.97)] {
                 let widening = Widening::cheapest(&tree, width);
                 let (cost, leaves) = widened(&tree, width, |at| widening.children(&tree, at));
