@@ -26,6 +26,8 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
 /// Minor version of files with four-wide or compressed trees, or with lighting.
 pub const TREES_AND_LIGHTING_MINOR: u16 = 4;
+/// Minor version of files whose tree has instances.
+pub const INSTANCES_MINOR: u16 = 5;
 /// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Maximum depth of reflections.
@@ -68,6 +70,9 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
     };
     if tables.bvh.traversal.is_new_in_minor_4() {
         container.expect_minor(TREES_AND_LIGHTING_MINOR, BVH, "this kind of tree")?;
+    }
+    if tables.bvh.instances.is_some() {
+        container.expect_minor(INSTANCES_MINOR, BVH, "instances")?;
     }
     if tables.meta.lighting.is_some() {
         container.expect_minor(TREES_AND_LIGHTING_MINOR, META, "this lighting")?;
@@ -193,6 +198,10 @@ fn check_bvh(bvh: &BvhSummary) -> Result<(), Broken> {
         "fewer than 2^32 triangles, nodes and leaves",
         format_args!("{counts:?}"),
     )?;
+    let instances = bvh.instances.unwrap_or_default();
+    let end = u64::from(instances.first) + u64::from(instances.count);
+    let expected = format_args!("instances below node {}", bvh.nodes);
+    ensure(end <= bvh.nodes, what, expected, end)?;
     ensure(
         bvh.sah_cost >= 0.0,
         what,

@@ -209,6 +209,17 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             self.container
                 .require_minor(tables::TREES_AND_LIGHTING_MINOR);
         }
+        if tables.bvh.instances.is_some() {
+            self.container.require_minor(tables::INSTANCES_MINOR);
+            let expected = "that of a tree without instances";
+            let is_absent = self.hierarchy.is_none();
+            require(
+                is_absent,
+                "content of the hierarchy",
+                expected,
+                &"instances",
+            )?;
+        }
         tables::write(tables, &mut self.container)?;
         Ok(self.container)
     }

@@ -193,12 +193,15 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
         triangles,
     } = trace.tables();
     let mut text = heading(trace.container(), &meta.trace, trace.content_checksum());
+    let instances = (bvh.instances).map(|of| format!("{} instances, ", of.count));
+    let instances = instances.unwrap_or_default();
     text += &format!(
-        "hierarchy by {}, walked as {}: {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
+        "hierarchy by {}, walked as {}: {}{} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
          {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}, \
          geometry {}, hierarchy {}\n\n",
         bvh.builder,
         name_of(&bvh.traversal),
+        instances,
         bvh.triangles,
         bvh.nodes,
         bvh.leaves,

@@ -110,7 +110,7 @@ pub fn trace_frame<W: Write + Seek + Send>(
         triangles: Vec::new(),
         stats: FrameStats::default(),
     };
-    let mut hit = vec![false; scene.soup.triangles.len()];
+    let mut hit = vec![false; scene.soup.count()];
     let tiles = tables.tile_count();
     let batches = (0..tables.meta.eyes.len()).flat_map(|eye| {
         let starts = (0..tiles).step_by(TILES_AT_ONCE as usize);

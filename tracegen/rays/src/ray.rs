@@ -30,6 +30,7 @@ impl Ray {
 
     /// False if a coordinate is not finite, the direction is zero, or the origin lies beyond
     /// [`LARGEST_COORDINATE`]. Such a ray hits nothing.
+    #[inline]
     pub fn is_valid(&self) -> bool {
         // Not by the largest element, because that ignores NaN.
         self.origin

@@ -50,7 +50,11 @@ impl TraceScene {
     /// # Errors
     /// The scene has too many triangles, or images that cannot be read.
     pub fn with_tree(mut scene: Scene, tree: TreeOptions) -> Result<Self, PrepareError> {
-        let soup = Soup::new(&scene);
+        let soup = if tree.instances {
+            Soup::of_instances(&scene)
+        } else {
+            Soup::new(&scene)
+        };
         let (bvh, materials) = rayon::join(
             || {
                 let masked: Vec<bool> = scene
@@ -58,12 +62,18 @@ impl TraceScene {
                     .iter()
                     .map(super::material::needs_alpha_test)
                     .collect();
-                Bvh::build_for(tree, &soup.triangles, |p| {
-                    masked
-                        .get(soup.material(&scene, p))
-                        .copied()
-                        .unwrap_or(false)
-                })
+                let masked = |p| masked.get(soup.material(&scene, p)) == Some(&true);
+                if !tree.instances {
+                    return Bvh::build_for(tree, &soup.triangles, masked);
+                }
+                let meshes: Vec<Vec<_>> = (scene.meshes.iter())
+                    .map(|mesh| {
+                        let corners = mesh.indices.chunks_exact(3);
+                        let at = |i: u32| mesh.positions[i as usize].to_array();
+                        corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]).collect()
+                    })
+                    .collect();
+                Bvh::build_instanced(tree, soup.origin, &meshes, &soup.placements, masked)
             },
             || Materials::new(&scene),
         );
@@ -144,7 +154,7 @@ impl<'a> Colouring<'a> {
 impl AlphaTest for Colouring<'_> {
     fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
         let s = self.scene;
-        let [a, b, c] = s.soup.triangles[primitive as usize].map(Vec3::from);
+        let [a, b, c] = s.soup.triangle(&s.scene, primitive).map(Vec3::from);
         // Light travels against its shadow ray.
         let enters = (b - a).cross(c - a).dot(self.direction) >= 0.0;
         let light = s

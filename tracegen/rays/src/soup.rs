@@ -1,5 +1,6 @@
 //! A scene as one list of world-space triangles, with the mesh of each.
 
+use crate::bvh::Placement;
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 use scene::{Mesh, Scene};
 
@@ -8,16 +9,17 @@ pub struct Soup {
     /// World position that the triangles are relative to: the middle of the scene's bounds, which
     /// minimises rounding to `f32`.
     pub origin: DVec3,
-    /// Vertices, counter-clockwise from the front.
+    /// Vertices, counter-clockwise from the front. Empty where triangles are moved when they are
+    /// asked for.
     pub triangles: Vec<[[f32; 3]; 3]>,
-    /// Object (instance) of each triangle.
-    pub objects: Vec<u32>,
-    /// First triangle of each object.
+    /// Where each object (instance) is.
+    pub placements: Vec<Placement>,
+    /// Object of each triangle; empty with `triangles`.
+    objects: Vec<u32>,
+    /// First triangle of each object, and the number of all.
     first_of_object: Vec<u32>,
     /// Inverse transpose of each object's transform.
     normal_matrices: Vec<Mat3>,
-    /// Objects whose transform reverses the winding.
-    mirrored: Vec<bool>,
 }
 
 /// Attributes at a point of a triangle.
@@ -39,50 +41,19 @@ pub struct Attributes {
 
 impl Soup {
     /// Flattens a scene. Positions are transformed and recentred in `f64`.
+    ///
+    /// # Panics
+    /// There are 2^32 triangles or more.
     pub fn new(scene: &Scene) -> Self {
-        let transforms: Vec<DAffine3> = scene
-            .instances
-            .iter()
-            .map(|i| DAffine3 {
-                matrix3: i.transform.matrix3.as_dmat3(),
-                translation: i.transform.translation.as_dvec3(),
-            })
-            .collect();
-        let world = || {
-            scene.instances.iter().zip(&transforms).flat_map(|(i, t)| {
-                let positions = &scene.meshes[i.mesh].positions;
-                positions.iter().map(|p| t.transform_point3(p.as_dvec3()))
-            })
-        };
-        let bounds = world()
-            .filter(|p| p.is_finite())
-            .map(|p| (p, p))
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let origin = bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0);
-        let mut soup = Self {
-            origin,
-            triangles: Vec::new(),
-            objects: Vec::new(),
-            first_of_object: Vec::new(),
-            normal_matrices: Vec::new(),
-            mirrored: Vec::new(),
-        };
+        let mut soup = Self::of_instances(scene);
         let mut moved: Vec<[f32; 3]> = Vec::new();
-        for (object, (instance, transform)) in (0u32..).zip(scene.instances.iter().zip(&transforms))
-        {
-            let mesh = &scene.meshes[instance.mesh];
+        for (object, placement) in (0u32..).zip(&soup.placements) {
+            let mesh = &scene.meshes[placement.mesh];
             moved.clear();
-            moved.extend(mesh.positions.iter().map(|p| {
-                (transform.transform_point3(p.as_dvec3()) - origin)
-                    .as_vec3()
-                    .to_array()
-            }));
-            let mirrored = instance.mirrored();
-            soup.first_of_object.push(soup.triangles.len() as u32);
-            soup.normal_matrices.push(instance.normal_matrix());
-            soup.mirrored.push(mirrored);
+            let positions = mesh.positions.iter();
+            moved.extend(positions.map(|p| placement.point(soup.origin, p.to_array())));
             for triangle in 0..mesh.triangles() {
-                let corners = corners(mesh, triangle, mirrored);
+                let corners = corners(mesh, triangle, placement.mirrored);
                 soup.triangles.push(corners.map(|v| moved[v]));
                 soup.objects.push(object);
             }
@@ -90,15 +61,88 @@ impl Soup {
         soup
     }
 
-    /// Attributes of a primitive at the weights of its second and third vertex.
-    pub fn attributes(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> Attributes {
-        let object = self.objects[primitive as usize] as usize;
+    /// [`Self::new`] without a list of the triangles.
+    ///
+    /// # Panics
+    /// There are 2^32 triangles or more.
+    pub fn of_instances(scene: &Scene) -> Self {
+        let placed = scene.instances.iter().map(|i| Placement {
+            mesh: i.mesh,
+            transform: DAffine3 {
+                matrix3: i.transform.matrix3.as_dmat3(),
+                translation: i.transform.translation.as_dvec3(),
+            },
+            mirrored: i.mirrored(),
+        });
+        let placements: Vec<Placement> = placed.collect();
+        let world = || {
+            placements.iter().flat_map(|at| {
+                let positions = scene.meshes[at.mesh].positions.iter();
+                positions.map(|p| at.transform.transform_point3(p.as_dvec3()))
+            })
+        };
+        let bounds = world()
+            .filter(|p| p.is_finite())
+            .map(|p| (p, p))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let mut first_of_object = vec![0u32];
+        for (object, placement) in placements.iter().enumerate() {
+            let triangles = scene.meshes[placement.mesh].triangles() as u32;
+            let end = first_of_object[object].checked_add(triangles);
+            first_of_object.push(end.expect("numbers of 32 bits"));
+        }
+        Self {
+            origin: bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0),
+            triangles: Vec::new(),
+            placements,
+            objects: Vec::new(),
+            first_of_object,
+            normal_matrices: (scene.instances.iter())
+                .map(scene::Instance::normal_matrix)
+                .collect(),
+        }
+    }
+
+    /// Number of triangles.
+    pub fn count(&self) -> usize {
+        self.first_of_object.last().copied().unwrap_or_default() as usize
+    }
+
+    /// Object (instance) of a primitive.
+    pub fn object(&self, primitive: u32) -> u32 {
+        (self.objects.get(primitive as usize).copied()).unwrap_or_else(|| {
+            let behind = self
+                .first_of_object
+                .partition_point(|first| *first <= primitive);
+            behind as u32 - 1
+        })
+    }
+
+    /// Vertices of a primitive.
+    pub fn triangle(&self, scene: &Scene, primitive: u32) -> [[f32; 3]; 3] {
+        if let Some(triangle) = self.triangles.get(primitive as usize) {
+            return *triangle;
+        }
+        let (mesh, _, corners) = self.corners(scene, primitive);
+        let placement = &self.placements[self.object(primitive) as usize];
+        corners.map(|v| placement.point(self.origin, mesh.positions[v].to_array()))
+    }
+
+    /// Mesh, object and vertex numbers of a primitive.
+    fn corners<'a>(&self, scene: &'a Scene, primitive: u32) -> (&'a Mesh, usize, [usize; 3]) {
+        let object = self.object(primitive) as usize;
         let mesh = &scene.meshes[scene.instances[object].mesh];
         let triangle = (primitive - self.first_of_object[object]) as usize;
-        let corners = corners(mesh, triangle, self.mirrored[object]);
+        let corners = corners(mesh, triangle, self.placements[object].mirrored);
+        (mesh, object, corners)
+    }
+
+    /// Attributes of a primitive at the weights of its second and third vertex.
+    pub fn attributes(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> Attributes {
+        let (mesh, object, corners) = self.corners(scene, primitive);
         let weights = [1.0 - bary[0] - bary[1], bary[0], bary[1]];
 
-        let [a, b, c] = self.triangles[primitive as usize].map(Vec3::from);
+        let [a, b, c] = self.triangle(scene, primitive).map(Vec3::from);
         let cross = (b - a).as_dvec3().cross((c - a).as_dvec3());
         let geometric_normal = cross.normalize_or_zero().as_vec3();
         let interpolated: Vec3 = (0..3)
@@ -136,30 +180,24 @@ impl Soup {
 
     /// Only the texture coordinates, for an alpha test.
     pub fn uv(&self, scene: &Scene, primitive: u32, bary: [f32; 2], set: u32) -> Vec2 {
-        let object = self.objects[primitive as usize] as usize;
-        let mesh = &scene.meshes[scene.instances[object].mesh];
-        let triangle = (primitive - self.first_of_object[object]) as usize;
+        let (mesh, _, corners) = self.corners(scene, primitive);
         let uvs = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-        let [p, q, r] = corners(mesh, triangle, self.mirrored[object])
-            .map(|v| uvs.get(v).copied().unwrap_or_default());
+        let [p, q, r] = corners.map(|v| uvs.get(v).copied().unwrap_or_default());
         p * (1.0 - bary[0] - bary[1]) + q * bary[0] + r * bary[1]
     }
 
     /// Alpha of the vertex colour; 1 where the mesh has none.
     pub fn vertex_alpha(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> f32 {
-        let object = self.objects[primitive as usize] as usize;
-        let mesh = &scene.meshes[scene.instances[object].mesh];
+        let (mesh, _, corners) = self.corners(scene, primitive);
         if mesh.colors.is_empty() {
             return 1.0;
         }
-        let triangle = (primitive - self.first_of_object[object]) as usize;
-        let corners = corners(mesh, triangle, self.mirrored[object]);
         color(mesh, corners, [1.0 - bary[0] - bary[1], bary[0], bary[1]]).w
     }
 
     /// Material of a primitive.
     pub fn material(&self, scene: &Scene, primitive: u32) -> usize {
-        let object = self.objects[primitive as usize] as usize;
+        let object = self.object(primitive) as usize;
         scene.meshes[scene.instances[object].mesh].material
     }
 }

@@ -445,9 +445,9 @@ fn facing_shading_normal(shading: Vec3, geometric: Vec3) -> Vec3 {
 pub fn triangle(scene: &TraceScene, primitive: u32) -> RayTriangle {
     RayTriangle {
         primitive,
-        object: scene.soup.objects[primitive as usize],
+        object: scene.soup.object(primitive),
         material: scene.soup.material(&scene.scene, primitive) as u32,
-        vertices: scene.soup.triangles[primitive as usize],
+        vertices: scene.soup.triangle(&scene.scene, primitive),
     }
 }
 

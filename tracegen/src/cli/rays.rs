@@ -72,6 +72,9 @@ pub struct RaysArgs {
     /// Lay the nodes out in treelets of this size; without it, depth first.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(256..=1 << 20))]
     treelets: Option<u32>,
+    /// Build one tree for each mesh that the scene repeats, and one over its instances: same hits, less memory.
+    #[arg(long, conflicts_with_all = ["hierarchy", "all_columns"])]
+    instances: bool,
     #[command(flatten)]
     light: LightArgs,
     #[command(flatten)]
@@ -111,6 +114,7 @@ impl RaysArgs {
         TreeOptions {
             kind: self.bvh,
             treelet_bytes: self.treelets,
+            instances: self.instances,
         }
     }
 
@@ -280,10 +284,12 @@ fn result(tables: &RaytraceTables, frame: &RayFrame) -> String {
         .map(|(kind, rays)| format!("{rays} {kind}"))
         .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
+    let instances = bvh.instances.map(|of| format!("{} instances, ", of.count));
     format!(
-        "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}\n\
+        "hierarchy: {}, {}{} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}\n\
          rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray",
         bvh.builder,
+        instances.unwrap_or_default(),
         bvh.triangles,
         bvh.nodes,
         bvh.leaves,

@@ -66,8 +66,13 @@ pub struct Forest {
 }
 
 impl Forest {
-    /// Builds it with the flag ROBUST and the best quality.
-    pub fn new(embree: &Embree, mesh: &[[[f32; 3]; 3]], placements: &[Placement]) -> Self {
+    /// Builds it with the flag ROBUST and a quality (`RTCBuildQuality`: 1 medium, the default; 2 high).
+    pub fn new(
+        embree: &Embree,
+        mesh: &[[[f32; 3]; 3]],
+        placements: &[Placement],
+        level: u32,
+    ) -> Self {
         const INSTANCE: u32 = 121;
         // SAFETY: types and numbers are those of Embree 4's headers. Buffers belong to Embree.
         unsafe {
@@ -90,7 +95,7 @@ impl Forest {
             let scene = || {
                 let scene = new_scene(embree.device);
                 flags(scene, 1 << 2);
-                quality(scene, 2);
+                quality(scene, level);
                 scene
             };
             let inner = scene();

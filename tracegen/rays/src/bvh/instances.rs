@@ -15,7 +15,7 @@ use super::traverse::{Width, walk};
 use super::{Bvh, BvhError, TreeOptions};
 use crate::ray::{LARGEST_COORDINATE, PreparedRay, Ray};
 use formats::raytrace::TraversalKind;
-use glam::{DAffine3, DMat3, DVec3, Mat3A, Vec3, Vec3A};
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::marker::PhantomData;
@@ -26,9 +26,9 @@ type Triangle = [[f32; 3]; 3];
 const LEAST_TRIANGLES: usize = 32;
 /// Largest magnitude of an instance's matrix, of its inverse, and of their product.
 const LARGEST_SCALE: f64 = (1 << 16) as f64;
-/// Padding in the mesh's space, in paddings of the world's slabs. The world's test is off by half
-/// of one, and the rounding of vertices and of the moved ray by less than that.
-const PADS: f32 = 2.0;
+/// Padding in the mesh's space beyond that of its own slabs, in paddings of the world's slabs. The
+/// world's test is off by half of one, and the rounding of vertices and of the moved ray by a third.
+const PADS: f32 = 1.0;
 
 /// A mesh placed in the world.
 #[derive(Clone, Copy, Debug)]
@@ -37,14 +37,11 @@ pub struct Placement {
     pub mesh: usize,
     /// Object to world.
     pub transform: DAffine3,
+    /// Whether the transform mirrors, which reverses the winding.
+    pub mirrored: bool,
 }
 
 impl Placement {
-    /// True where the transform mirrors, which reverses the winding.
-    pub fn mirrored(&self) -> bool {
-        self.transform.matrix3.determinant() < 0.0
-    }
-
     /// A point in the world, relative to an origin.
     #[inline(always)]
     pub fn point(&self, origin: DVec3, p: [f32; 3]) -> [f32; 3] {
@@ -54,7 +51,7 @@ impl Placement {
 
     /// A triangle of the mesh in the world, counter-clockwise from its front.
     pub fn triangle(&self, origin: DVec3, vertices: Triangle) -> Triangle {
-        wound(vertices.map(|p| self.point(origin, p)), self.mirrored())
+        wound(vertices.map(|p| self.point(origin, p)), self.mirrored)
     }
 
     /// Whether rays can be moved to the mesh's space with little loss.
@@ -88,35 +85,78 @@ fn boxed(points: impl Iterator<Item = [f32; 3]>) -> Triangle {
     [min.to_array(), max.to_array(), min.to_array()]
 }
 
-/// An instance, as rays read it.
+/// Columns of an affine map, four numbers each for vector instructions.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Columns([[f64; 4]; 4]);
+
+impl Columns {
+    fn new(map: &DAffine3) -> Self {
+        let m = map.matrix3;
+        let columns = [m.x_axis, m.y_axis, m.z_axis, map.translation];
+        Self(columns.map(|c| [c.x, c.y, c.z, 0.0]))
+    }
+
+    /// A vector; with `POINT`, of a point. Operations are those of [`DAffine3`], in its order.
+    #[inline(always)]
+    fn times<const POINT: bool>(&self, [x, y, z]: [f32; 3]) -> [f64; 4] {
+        let [a, b, c, moved] = &self.0;
+        let [x, y, z] = [x, y, z].map(f64::from);
+        std::array::from_fn(|i| {
+            let sum = a[i] * x + b[i] * y + c[i] * z;
+            if POINT { sum + moved[i] } else { sum }
+        })
+    }
+}
+
+#[inline(always)]
+fn rounded(v: [f64; 4]) -> [f32; 3] {
+    let v = v.map(|x| x as f32);
+    [v[0], v[1], v[2]]
+}
+
+/// An instance. Rays that enter it read its first cache lines, and those that may hit it all.
+#[repr(C)]
 pub(super) struct Instance {
-    placement: Placement,
-    /// World position that its coordinates in the world are relative to.
-    origin: DVec3,
-    to_object: DAffine3,
-    /// Magnitudes of `to_object`, for padding.
-    spread: Mat3A,
+    to_object: Columns,
     /// Number of its tree.
     pub tree: u32,
     first_primitive: u32,
     mirrored: bool,
+    /// World position that its coordinates in the world are relative to.
+    origin: [f64; 4],
+    to_world: Columns,
 }
 
 impl Instance {
     fn new(placement: Placement, origin: DVec3, tree: usize, first_primitive: u32) -> Self {
         let inverse = placement.transform.matrix3.inverse();
         let from = placement.transform.translation - origin;
-        let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
-        let [x, y, z] = columns.map(|c| Vec3A::from(c.abs().as_vec3()));
         Self {
-            mirrored: placement.mirrored(),
-            placement,
-            origin,
-            to_object: DAffine3::from_mat3_translation(inverse, inverse * -from),
-            spread: Mat3A::from_cols(x, y, z),
+            mirrored: placement.mirrored,
+            to_world: Columns::new(&placement.transform),
+            origin: [origin.x, origin.y, origin.z, 0.0],
+            to_object: Columns::new(&DAffine3::from_mat3_translation(inverse, inverse * -from)),
             tree: tree as u32,
             first_primitive,
         }
+    }
+
+    /// Padding of the mesh's space for a ray that is padded in the world.
+    #[inline(always)]
+    fn pad(&self, world: Vec3A) -> Vec3A {
+        let sizes = Columns(self.to_object.0.map(|column| column.map(f64::abs)));
+        rounded(sizes.times::<false>((PADS * world).to_array())).into()
+    }
+
+    /// A triangle of the mesh in the world, as [`Placement::triangle`] has it.
+    #[inline(always)]
+    fn triangle(&self, vertices: Triangle) -> Triangle {
+        let moved = vertices.map(|p| {
+            let world = self.to_world.times::<true>(p);
+            rounded(std::array::from_fn(|i| world[i] - self.origin[i]))
+        });
+        wound(moved, self.mirrored)
     }
 
     /// A ray in the mesh's space.
@@ -124,10 +164,8 @@ impl Instance {
     fn moved(&self, ray: &Ray) -> Ray {
         let to_object = &self.to_object;
         Ray {
-            origin: to_object.transform_point3(ray.origin.as_dvec3()).as_vec3(),
-            direction: to_object
-                .transform_vector3(ray.direction.as_dvec3())
-                .as_vec3(),
+            origin: rounded(to_object.times::<true>(ray.origin.to_array())).into(),
+            direction: rounded(to_object.times::<false>(ray.direction.to_array())).into(),
             ..*ray
         }
     }
@@ -165,7 +203,7 @@ impl Bvh {
         origin: DVec3,
         meshes: &[Vec<Triangle>],
         placements: &[Placement],
-        masked: impl Fn(u32) -> bool + Sync,
+        masked: impl Fn(u32) -> bool,
     ) -> Result<Self, BvhError> {
         let of = |p: &Placement| meshes[p.mesh].len();
         let found = placements.iter().map(of).sum();
@@ -224,6 +262,7 @@ impl Bvh {
             let here = Placement {
                 mesh: 0,
                 transform: DAffine3::IDENTITY,
+                mirrored: false,
             };
             let bounds = boxed([min, max].map(|p| p.to_array()).into_iter());
             placed.push((bounds, Instance::new(here, DVec3::ZERO, trees.len(), 0)));
@@ -364,13 +403,7 @@ impl Place for Moved<'_> {
         vertices: Triangle,
         [near, far]: [f32; 2],
     ) -> Option<(Triangle, [f32; 2])> {
-        let Instance {
-            placement,
-            origin,
-            mirrored,
-            ..
-        } = self.instance;
-        let vertices = wound(vertices.map(|p| placement.point(*origin, p)), *mirrored);
+        let vertices = self.instance.triangle(vertices);
         if !ray.line_hits(&vertices) {
             return None;
         }
@@ -428,7 +461,7 @@ impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a>> LeafTest<K> for Enter
         if !ray.is_valid() {
             return Some(self.t_max);
         }
-        let pad = instance.spread * (PADS * self.prepared.pad);
+        let pad = instance.pad(self.prepared.pad);
         let prepared = PreparedRay::with_pad(&ray, tree.bvh.bounds, pad);
         let loaded = K::load(&prepared);
         let place = Moved {

@@ -14,6 +14,8 @@ pub struct TreeOptions {
     pub kind: TraversalKind,
     /// Size of its treelets. Without, nodes are depth first.
     pub treelet_bytes: Option<u32>,
+    /// Whether a scene's repeated meshes are instances of one tree each.
+    pub instances: bool,
 }
 
 impl TreeOptions {
@@ -29,6 +31,7 @@ impl From<TraversalKind> for TreeOptions {
         Self {
             kind,
             treelet_bytes: None,
+            instances: false,
         }
     }
 }

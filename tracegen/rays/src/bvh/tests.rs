@@ -10,8 +10,8 @@ fn hits_of_all_trees_and_both_kernels_equal_brute_force() {
     for kind in TraversalKind::ALL {
         for treelet_bytes in [None, Some(1024)] {
             hits_equal_brute_force(TreeOptions {
-                kind,
                 treelet_bytes,
+                ..kind.into()
             });
         }
     }

@@ -48,7 +48,12 @@ impl Places {
             matrix3,
             translation: translation + origin,
         };
-        Placement { mesh, transform }
+        let mirrored = transform.matrix3.determinant() < 0.0;
+        Placement {
+            mesh,
+            transform,
+            mirrored,
+        }
     }
 }
 
