@@ -12,7 +12,7 @@ mod ttp;
 use super::config::Prefetch;
 use super::frame::{FrameError, RaySource};
 use formats::raytrace::{BvhSummary, ChildKind, Hierarchy, RayGeometry, RayRecord, Visit};
-use sim::registry::{Named, Row};
+use sim::registry::Named;
 use stacks::{Stacks, visits_of};
 
 /// A row of the table of prefetchers.
@@ -29,34 +29,16 @@ pub struct PrefetchRow {
 /// A named prefetcher.
 pub type RayPrefetching = Named<PrefetchRow>;
 
-const TABLE: &[RayPrefetching] = &[
-    RayPrefetching::new(&none::ROW),
-    RayPrefetching::new(&treelet::ROW),
-    RayPrefetching::new(&ttp::ROW),
-];
-
-impl Row for PrefetchRow {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn help(&self) -> &'static str {
-        self.help
-    }
-
-    fn table() -> &'static [Named<Self>] {
-        TABLE
-    }
-
-    fn names() -> &'static [&'static str] {
-        &[none::ROW.name, treelet::ROW.name, ttp::ROW.name]
-    }
+sim::rows! { PrefetchRow:
+    RayPrefetching::new(&none::ROW);
+    RayPrefetching::new(&treelet::ROW);
+    RayPrefetching::new(&ttp::ROW);
 }
 
 impl Default for Prefetch {
     fn default() -> Self {
         Self {
-            prefetcher: TABLE[0],
+            prefetcher: RayPrefetching::new(&none::ROW),
             treelet_bytes: 512,
             stack_entries: 1,
             visits_dropped: false,
