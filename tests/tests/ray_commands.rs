@@ -423,3 +423,46 @@ fn columns_that_a_trace_lacks_are_refused() {
         assert!(message.contains(expected), "{options:?}: {message}");
     }
 }
+
+/// Closest-hit rays that visit all of their stacks use every line that `ttp` fetches, if caches keep all lines.
+#[test]
+fn stacks_of_a_captured_trace_hold_what_its_rays_visit() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [path, machine] = ["all.raytrace", "machine.toml"].map(|name| folder.path().join(name));
+    capture_columns(&path);
+    let all_lines = "cache.node_l1_bytes = 67108864\ncache.triangle_l1_bytes = 67108864\n\
+                     cycles.l1_mshrs = 100000\ncycles.l2_mshrs = 100000\n\
+                     cycles.prefetch = { stack_entries = 8, visits_dropped = true }\n";
+    fs::write(&machine, all_lines).expect("temporary file");
+    let left = |options: &[&str]| -> Value {
+        let mut command = program("replay");
+        let fixed = [
+            "reproject",
+            "--timing",
+            "cycle",
+            "--rays",
+            "primary,reflection",
+        ];
+        command.args(fixed).arg("--json").args(options).arg(&path);
+        let report: Value = serde_json::from_str(&text(run_ok(&mut command))).expect("JSON");
+        report["result"]["cycles"]["left"].clone()
+    };
+    let machine = machine.to_str().expect("text");
+    let ttp = left(&["--config", machine, "--prefetch", "ttp"]);
+    let [issued, used] = ["issued", "useful"].map(|key| ttp["prefetch"][key].as_u64());
+    assert!(issued > Some(20), "{ttp}");
+    assert_eq!(
+        used.zip(ttp["prefetch"]["late"].as_u64())
+            .map(|(a, b)| a + b),
+        issued
+    );
+    // Dropped entries are visited in addition; without a prefetcher nothing else changes.
+    let all = left(&["--config", machine]);
+    assert_eq!(all["requests"], ttp["requests"]);
+    let plain = left(&[]);
+    assert!(plain["requests"].as_u64() < all["requests"].as_u64());
+    assert_eq!(plain, left(&["--prefetch", "none"]));
+    let treelet = left(&["--prefetch", "treelet"]);
+    assert_eq!(treelet["requests"], plain["requests"]);
+    assert!(treelet["l1_misses"].as_u64() < plain["l1_misses"].as_u64());
+}

@@ -15,6 +15,9 @@ use sim::order::WorkItem;
 use sim::order::rays::{RayPlan, eye_of};
 use std::ops::Range;
 
+/// A ray's requests, and its eye.
+type RayPath = (Range<usize>, Eye);
+
 /// The batches of one or both eyes in one way, in the order of a plan.
 ///
 /// A warp consists of rays of one class and unit. The rays of a tile are all available at once, as in the closed form:
@@ -34,7 +37,7 @@ pub(super) struct RayBatches<'a> {
     /// The next batches.
     batches: Box<dyn Iterator<Item = &'a [WorkItem]> + Send + 'a>,
     /// Rays of the batch by unit and class, as ranges of its requests.
-    rays: Vec<[Vec<(Range<usize>, Eye)>; 3]>,
+    rays: Vec<[Vec<RayPath>; 3]>,
 }
 
 impl<'a> RayBatches<'a> {

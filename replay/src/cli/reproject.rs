@@ -377,20 +377,10 @@ mod tests {
     }
 
     #[test]
-    fn a_prefetcher_needs_the_cycle_level_model_and_the_stacks_of_rays() {
-        let (_folder, path) = trace_file();
-        let error = run(args(&[&path, "--prefetch", "ttp"])).unwrap_err();
+    fn a_prefetcher_needs_the_cycle_level_model() {
+        let error = run(args(&["a", "--prefetch", "ttp"])).unwrap_err();
         let expected = "--prefetch: expected --timing cycle, found --timing closed-form";
         assert_eq!(error.to_string(), expected);
-        let source = trace(&wall(4.0, [30.0, 30.0], 0.0, 1), View::default()).with_visits();
-        std::fs::write(&path, source.to_bytes()).expect("written");
-        let error = run(args(&[&path, "--prefetch", "ttp", "--timing", "cycle"])).unwrap_err();
-        let text = format!("{error:#}");
-        assert!(
-            text.contains("cycles.prefetch (ttp): expected a trace with"),
-            "{text}"
-        );
-        assert!(text.contains("tracegen rays --all-columns"), "{text}");
     }
 
     #[test]

@@ -86,7 +86,7 @@ fn a_perfect_prefetch_hides_all_latencies_but_the_first() {
     let ray: Vec<Request> = (0..10)
         .map(|k| request(100 * k, Pipeline::Traversal))
         .collect();
-    let mut batch = batch(m.units, &[ray.clone()]);
+    let mut batch = batch(m.units, std::slice::from_ref(&ray));
     let step = m.pipelines[0].latency;
     let from_dram = m.l2_latency + m.dram_latency;
     assert_eq!(
@@ -94,7 +94,7 @@ fn a_perfect_prefetch_hides_all_latencies_but_the_first() {
         10 * (step + from_dram) + 2
     );
     batch.prefetches = ray[1..].to_vec();
-    batch.ahead = vec![0..9];
+    batch.ahead.push(0..9);
     let simulated = run(&m, &[batch.clone()]);
     assert_eq!(simulated.unit_cycles, 10 * step + from_dram + 2);
     let p = simulated.counts.prefetch;

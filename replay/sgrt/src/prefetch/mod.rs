@@ -23,8 +23,10 @@ pub struct PrefetchRow {
     /// One line of help.
     pub help: &'static str,
     /// Builds it for a hierarchy; `None` if nothing is ever fetched ahead.
-    build: Option<fn(&Prefetch, &BvhSummary, &Hierarchy) -> Box<dyn RayPrefetcher>>,
+    build: Option<Build>,
 }
+
+type Build = fn(&Prefetch, &BvhSummary, &Hierarchy) -> Box<dyn RayPrefetcher>;
 
 /// A named prefetcher.
 pub type RayPrefetching = Named<PrefetchRow>;

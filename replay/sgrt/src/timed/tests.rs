@@ -129,6 +129,22 @@ fn a_warp_requests_the_union_of_its_rays_requests() {
 }
 
 #[test]
+fn a_prefetcher_needs_the_stacks_of_rays() {
+    let source = room().with_visits();
+    let loaded = LoadedTrace::load(&source).expect("loads");
+    let text = "[cycles.prefetch]\nprefetcher = 'ttp'";
+    let config = SgrtConfig::from_overrides(text).expect("valid");
+    let (rule, mut tiles) = (Rule::default(), TileSequence::default());
+    let runs = loaded.run_with_plain(&rule, Reuse::Primary, &config, Timing::Cycle, &mut tiles);
+    let text = runs.map(drop).unwrap_err().to_string();
+    assert!(
+        text.starts_with("cycles.prefetch (ttp): expected"),
+        "{text}"
+    );
+    assert!(text.contains("tracegen rays --all-columns"), "{text}");
+}
+
+#[test]
 fn a_trace_without_visits_is_refused_with_the_option_that_adds_them() {
     let source = room();
     let loaded = LoadedTrace::load(&source).expect("loads");
