@@ -373,9 +373,14 @@ def main(path, what=None):
     text = parse_json(chunks["META"])
     shape = RAY_META | ({"lighting": LIGHTING} if "lighting" in text else {})
     meta = check_ray_meta(shaped(text, shape))
-    bvh = check_hierarchy(shaped(parse_json(chunks["RBVH"]), HIERARCHY))
+    summary = parse_json(chunks["RBVH"])
+    instances = {"instances": {"first": "u32", "count": "u32"}} if "instances" in summary else {}
+    bvh = check_hierarchy(shaped(summary, HIERARCHY | instances))
     if "lighting" in meta or bvh["traversal"] in ("bvh4", "cwbvh8"):
         require(version[1] >= 4, "a later version")
+    if instances:
+        require(version[1] >= 5, "a later version")
+        require(sum(bvh["instances"].values()) <= bvh["nodes"], "instances")
     materials = shaped(parse_json(chunks["RMAT"]), (MATERIAL,))
     lights = [read_light(light) for light in shaped(parse_json(chunks["RLIT"]), ("any",))]
     triangles = read_triangles(chunks["RTRI"], materials)

@@ -12,6 +12,7 @@ mod reference_walk;
 #[allow(dead_code)]
 mod robustness;
 
+use super::bvh::TreeOptions;
 use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;
 use super::scene::TraceScene;
@@ -23,7 +24,7 @@ use formats::raytrace::{
 };
 use formats::textrace::TraceMeta;
 use formats::view::Eye;
-use glam::{Affine3A, Vec2, Vec3, Vec4};
+use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
 use lab::traversal::reference::TestMesh;
 use scene::{AlphaMode, Camera, Instance, Light, Material, Mesh, Scene, cameras, hmd};
 
@@ -191,9 +192,10 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
 
 fn trace(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> (RayFrame, Vec<u8>) {
     let mut tables = tables(scene, settings, size_px);
-    let hierarchy = scene.bvh.contents(settings.traversal);
-    let writer = RaytraceWriter::in_memory().expect("in memory");
-    let mut writer = writer.with_hierarchy(hierarchy);
+    let mut writer = RaytraceWriter::in_memory().expect("in memory");
+    if tables.bvh.instances.is_none() {
+        writer = writer.with_hierarchy(scene.bvh.contents(settings.traversal));
+    }
     let mut frame = trace_frame(scene, settings, &tables, &mut writer, |_| ()).expect("traces");
     tables.triangles = std::mem::take(&mut frame.triangles);
     let bytes = writer.into_bytes(&tables).expect("writes");
@@ -243,18 +245,42 @@ fn the_bytes_do_not_depend_on_threads_or_run() {
 
 #[test]
 fn all_trees_give_the_same_picture_and_the_same_rays() {
-    let traced = |tree: TraversalKind| {
-        let scene = TraceScene::with_tree(scene(), tree.into()).expect("small");
-        let (frame, bytes) = trace(&scene, settings(tree), SIZE_PX);
-        (frame, Raytrace::from_bytes(bytes).expect("opens"))
+    let traced = |kind: TraversalKind, instances| {
+        let mut scene = scene();
+        for i in 1..5 {
+            // Mirrored and uneven copies of chrome and glass.
+            let size = Vec3::new(-0.5, 0.3, 0.1 * i as f32);
+            let turn = Quat::from_rotation_x(i as f32);
+            let place = Vec3::new(i as f32 - 2.5, 2.0, 1.5);
+            scene.instances.push(Instance {
+                mesh: 2 + i % 2,
+                transform: Affine3A::from_scale_rotation_translation(size, turn, place),
+            });
+        }
+        let options = TreeOptions {
+            instances,
+            ..kind.into()
+        };
+        let scene = TraceScene::with_tree(scene, options).expect("small");
+        let (frame, bytes) = trace(&scene, settings(kind), SIZE_PX);
+        let file = Raytrace::from_bytes(bytes).expect("opens");
+        let version = if instances { 5 } else { 3 };
+        assert!(file.container().version().1 >= version);
+        let counted = file.tables().bvh.instances.map(|of| of.count);
+        // Three of chrome, three of glass, and the rest.
+        assert_eq!(counted, instances.then_some(7));
+        (frame, file)
     };
-    let (frame, binary) = traced(TraversalKind::Bvh2);
-    for tree in [
-        TraversalKind::Bvh4,
-        TraversalKind::Bvh8,
-        TraversalKind::Cwbvh8,
+    let (frame, binary) = traced(TraversalKind::Bvh2, false);
+    for (tree, instances) in [
+        (TraversalKind::Bvh4, false),
+        (TraversalKind::Bvh8, false),
+        (TraversalKind::Cwbvh8, false),
+        (TraversalKind::Bvh2, true),
+        (TraversalKind::Bvh4, true),
+        (TraversalKind::Cwbvh8, true),
     ] {
-        let (other_frame, other) = traced(tree);
+        let (other_frame, other) = traced(tree, instances);
         assert_eq!(frame.images[0].pixels, other_frame.images[0].pixels);
         assert_eq!(frame.images[1].pixels, other_frame.images[1].pixels);
         let (mut a, mut b) = (RayTile::default(), RayTile::default());

@@ -5,7 +5,7 @@ use super::node::{Block, Child, MASKED, Node8};
 use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, TraversalKind};
 
 impl Bvh {
-    /// All inner nodes of a tree, with the boxes that its traversal tests, and its triangles by slot.
+    /// All inner nodes of a tree without instances, with the boxes that its traversal tests, and its triangles by slot.
     pub fn contents(&self, traversal: TraversalKind) -> Hierarchy {
         let slots = self.slots_of(traversal);
         let wide = |nodes: &[Node8]| wide_children(nodes, traversal.width(), slots);
