@@ -3,10 +3,11 @@
 `speed` needs the Python package embreex, whose library it calls directly: leave the machine to it.
 """
 
+import importlib.util
 import json
 from pathlib import Path
 
-from .common import bench, execute, machine
+from .common import Absent, bench, execute, machine
 
 OPTIONS = {
     "part": dict(choices=["hits", "memory", "speed"]),
@@ -40,9 +41,10 @@ def memory(study):
 
 
 def speed(study):
-    import embreex  # its wheel has the library
-
-    library = next((Path(embreex.__file__).parents[1] / "embreex.libs").glob("libembree4*"))
+    package = importlib.util.find_spec("embreex")
+    if not package:
+        raise Absent("the Python package embreex")
+    library = next((Path(package.origin).parents[1] / "embreex.libs").glob("libembree4*"))
     heading = "rays | Embree | Embree, high quality | BVH8 | BVH2 | BVH8 / Embree | BVH2 / Embree | " + " | ".join(
         f"{tree} {count}" for tree in ("BVH8", "BVH2") for count in COUNTS.split(", ")
     )
