@@ -28,7 +28,9 @@ const LEAST_TRIANGLES: usize = 32;
 const LARGEST_SCALE: f64 = (1 << 16) as f64;
 /// Padding in the mesh's space beyond that of its own slabs, in paddings of the world's slabs. The
 /// world's test is off by half of one, and the rounding of vertices and of the moved ray by a third.
-const PADS: f32 = 1.0;
+/// A ray that grazes a triangle at an edge may hit it further out: of a million rays at flat
+/// instances, 16 then differ with one padding and 3 with four, which cost 1 % more tests.
+const PADS: f32 = 4.0;
 
 /// A mesh placed in the world.
 #[derive(Clone, Copy, Debug)]
