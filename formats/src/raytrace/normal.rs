@@ -13,7 +13,7 @@ pub fn encode(n: [f32; 3]) -> [i16; 2] {
     [x, y].map(|v| (v * 32767.0).round() as i16)
 }
 
-/// The unit vector of a code.
+/// The unit vector of a code. Zeros are +0, so that encoding it again gives the same vector, bit by bit.
 pub fn decode(code: [i16; 2]) -> [f32; 3] {
     let [mut x, mut y] = code.map(|v| f32::from(v.max(-32767)) / 32767.0);
     let z = 1.0 - x.abs() - y.abs();
@@ -21,7 +21,7 @@ pub fn decode(code: [i16; 2]) -> [f32; 3] {
         (x, y) = ((1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y));
     }
     let length = (x * x + y * y + z * z).sqrt();
-    [x / length, y / length, z / length]
+    [x / length + 0.0, y / length + 0.0, z / length]
 }
 
 fn sign(v: f32) -> f32 {
@@ -43,6 +43,27 @@ mod tests {
             let back = decode(encode(n));
             let error: f32 = (0..3).map(|a| (n[a] - back[a]).abs()).fold(0.0, f32::max);
             assert!(error < 1e-4, "{n:?} {back:?}");
+        }
+    }
+
+    #[test]
+    fn a_decoded_normal_is_decoded_to_the_same_bits_again() {
+        let stays = |code: [i16; 2]| {
+            let normal = decode(code);
+            let again = decode(encode(normal));
+            assert_eq!(
+                again.map(f32::to_bits),
+                normal.map(f32::to_bits),
+                "{code:?}"
+            );
+        };
+        for x in i16::MIN..=i16::MAX {
+            // The border of the square, its middle lines, the diagonals where z is 0, and a line in between.
+            let rest = 32767 - x.saturating_abs();
+            for y in [i16::MIN, -32767, -1, 0, 1, 32767, rest, -rest, x ^ 0x2A5] {
+                stays([x, y]);
+                stays([y, x]);
+            }
         }
     }
 
