@@ -133,7 +133,7 @@ fn forest(count: usize) -> Vec<Placement> {
             - side as f64 / 2.0 * (DVec3::X + DVec3::Z);
         let turn = DQuat::from_rotation_y(signed() * 3.2) * DQuat::from_rotation_x(signed() * 0.08);
         let scale = DVec3::splat(1.0 + 0.3 * signed())
-            * DVec3::new(if i % 7 == 0 { -1.0 } else { 1.0 }, 1.0, 1.0);
+            * DVec3::new(if i.is_multiple_of(7) { -1.0 } else { 1.0 }, 1.0, 1.0);
         let at = at * 5.0 + DVec3::new(signed(), 0.0, signed()) * 1.5;
         // As scenes hold it.
         let transform = DAffine3::from_scale_rotation_translation(scale, turn, at).as_affine3a();
@@ -144,7 +144,7 @@ fn forest(count: usize) -> Vec<Placement> {
         Placement {
             mesh: 0,
             transform,
-            mirrored: i % 7 == 0,
+            mirrored: i.is_multiple_of(7),
         }
     };
     (0..count).map(place).collect()
