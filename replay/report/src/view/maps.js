@@ -77,23 +77,26 @@ const fillWords = (pass, at, number, now) => {
       : ramp[Math.min(255, 255 * shown[tile] / most | 0)];
   }
 };
+// Cells of this width in pixels have lines between them.
+const WIDE = 7;
 // What stays the same is drawn once: picture and names below the tiles, the grid above them.
 const isShown = pass => picture && picture.complete && pass.eye !== null;
 const drawStill = (canvas, { list, height }) => {
   const key = [canvas.clientWidth, state.frame, inks.fg, devicePixelRatio, isShown(frame().passes[0])].join();
   if (canvas.key === key) return;
   canvas.key = key;
-  const ink = fit(canvas, height), grid = fit(canvas.parentNode.lastChild, height);
+  // A canvas costs time in each picture, even if nothing is drawn on it.
+  const above = canvas.parentNode.lastChild;
+  above.hidden = list.every(({ cell }) => cell < WIDE);
+  const ink = fit(canvas, height), grid = fit(above, height);
   grid.strokeStyle = inks.line;
+  grid.globalAlpha = 0.25;
   frame().passes.forEach((pass, at) => {
     const { x, y, w, h, cell } = list[at], half = isShown(pass) && picture.naturalWidth / 2;
     if (half) ink.drawImage(picture, pass.eye * half, 0, half, picture.naturalHeight, x, y, w, h);
     ink.fillStyle = inks.fg;
     ink.fillText(pass.name, x, y - 5);
-    grid.globalAlpha = 1;
-    grid.strokeRect(x, y, w, h);
-    if (cell < 7) return;
-    grid.globalAlpha = 0.25;
+    if (cell < WIDE) return;
     grid.beginPath();
     for (let column = 1; column < pass.tiles[0]; column++) grid.rect(x + column * cell, y, 0, h);
     for (let row = 1; row < pass.tiles[1]; row++) grid.rect(x, y + row * cell, w, 0);
@@ -112,6 +115,8 @@ const drawRun = (canvas, number) => {
     ink.globalAlpha = isShown(pass) ? 0.72 : 1;
     ink.drawImage(pass.small, x, y, w, h);
     ink.globalAlpha = 1;
+    ink.strokeStyle = inks.line;
+    ink.strokeRect(x, y, w, h);
   });
   const centre = ({ pass, tile }) => {
     const { x, y, cell } = list[pass], columns = frame().passes[pass].tiles[0];
