@@ -31,7 +31,7 @@ const draw = now => {
   if (!data.metrics) {
     drawCurve();
     // Nobody reads figures that change with every picture. Their layout and the slider take half of the time.
-    if (!state.playing || now - lastCount > 400) {
+    if (!state.playing || now - lastCount > 500) {
       count();
       $("at").value = 1000 * state.at;
       lastCount = now;
