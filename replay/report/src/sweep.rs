@@ -4,6 +4,7 @@ use super::answers;
 use super::columns::{Column, Columns, PointColumn, columns_of};
 use super::config_columns;
 use super::document::Document;
+use super::errors;
 use super::figures::{figure, figures, number};
 use super::html::{self, Answer, Page, settings};
 use super::lists::unique;
@@ -227,9 +228,10 @@ impl SweepReport<'_> {
         let traces = self.outcome.subjects.len() as f64;
         (smallest < largest).then(|| {
             format!(
-                "The smallest L2 within 5 % of the least traffic has {}: {:.2} MB per frame ({}).",
+                "The smallest L2 within 5 % of the least traffic has {}: {:.2} MB per frame (known errors: {:.1} %; {}).",
                 format_bytes(best.0),
                 best.1 / traces,
+                errors::sum_of_largest("external_bytes"),
                 best.2
             )
         })
