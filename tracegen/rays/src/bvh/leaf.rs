@@ -61,7 +61,7 @@ pub trait LeafTest<K: Kernel> {
     const LONG: bool = false;
     /// Tests a leaf and returns the new `t_max`, or `None` to stop.
     fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32>;
-    /// Told before each test how many entries are on the stack.
+    /// Called before each test with the number of entries on the stack.
     #[inline(always)]
     fn stacked(&mut self, entries: u32) {
         let _ = entries;
