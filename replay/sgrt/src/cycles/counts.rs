@@ -53,14 +53,14 @@ impl UnitCycles {
     }
 }
 
-/// Lines that a prefetcher asked for.
+/// Lines that a prefetcher requested.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PrefetchCounts {
     /// All of them.
     pub requested: u64,
     /// Resident or in flight already.
     pub held: u64,
-    /// Given up for want of an MSHR.
+    /// Dropped because no MSHR was free.
     pub dropped: u64,
     /// Fetched into an L1.
     pub issued: u64,
@@ -109,7 +109,7 @@ pub struct Counts {
     pub l1_mshr_waits: u64,
     /// Times that a request waited for an MSHR of the L2.
     pub l2_mshr_waits: u64,
-    /// What a prefetcher asked for.
+    /// Lines that a prefetcher requested.
     pub prefetch: PrefetchCounts,
     /// Cycles of all units by cause.
     pub cycles: UnitCycles,

@@ -1,6 +1,6 @@
 //! The configuration of the simulation in whole cycles of the units' clock.
 
-use crate::config::SgrtConfig;
+use crate::config::{Prefetch, SgrtConfig};
 use formats::raytrace::TraversalKind;
 use sim::memory::{TICKS, ticks};
 
@@ -60,6 +60,8 @@ pub struct Machine {
     pub dram_ticks_per_line: u64,
     /// Tiles that are between dispatch and the end of shading.
     pub tile_buffers: usize,
+    /// True if lines are prefetched.
+    pub has_prefetcher: bool,
 }
 
 impl Machine {
@@ -101,6 +103,7 @@ impl Machine {
             dram_latency: ((config.memory.latency_ns * cycles_per_ns).round() as u64).max(1),
             dram_ticks_per_line: ticks(line_ns * cycles_per_ns),
             tile_buffers: cycles.tile_buffers as usize,
+            has_prefetcher: cycles.prefetch.prefetcher != Prefetch::default().prefetcher,
         }
     }
 }

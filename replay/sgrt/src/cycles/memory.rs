@@ -20,12 +20,12 @@ pub struct Level {
     scheduled: bool,
     /// Prefetched lines that no ray has requested. Evicted ones are removed when they are fetched again.
     unused: HashSet<u32>,
-    /// The eye that fetched each line last.
-    fetched_by: HashMap<u32, Eye>,
+    /// The eye that fetched each line last; absent without a prefetcher, because it costs time at each miss.
+    fetched_by: Option<HashMap<u32, Eye>>,
 }
 
 impl Level {
-    fn new(size: CacheSize, usual_cycles: u64) -> Self {
+    fn new(size: CacheSize, usual_cycles: u64, has_prefetcher: bool) -> Self {
         let cache = AnyCache::lru(size.sets, size.ways).into_box();
         Self {
             cache: cache.delayed(usual_cycles),
@@ -33,13 +33,27 @@ impl Level {
             waiting: VecDeque::new(),
             scheduled: false,
             unused: HashSet::new(),
-            fetched_by: HashMap::new(),
+            fetched_by: has_prefetcher.then(HashMap::new),
         }
     }
 
     /// True if the other eye fetched the line last.
     fn is_of_other(&self, line: u32, eye: Eye) -> bool {
-        self.fetched_by.get(&line).is_some_and(|by| *by != eye)
+        let eyes = self.fetched_by.as_ref();
+        eyes.and_then(|eyes| eyes.get(&line))
+            .is_some_and(|by| *by != eye)
+    }
+
+    /// Notes the eye that fetches a line.
+    fn note(&mut self, line: u32, eye: Eye) {
+        if let Some(eyes) = &mut self.fetched_by {
+            eyes.insert(line, eye);
+        }
+    }
+
+    /// 1 if a line is prefetched and no ray has requested it before; 0 otherwise.
+    fn take_unused(&mut self, line: u32) -> u64 {
+        u64::from(!self.unused.is_empty() && self.unused.remove(&line))
     }
 
     /// Appends a ray to the queue.
@@ -112,10 +126,14 @@ impl CacheMemory {
     /// Empty caches and an idle channel.
     pub fn new(machine: &Machine) -> Self {
         let usual = machine.dram_latency + machine.l2_latency;
-        let of_unit = |_| machine.l1.map(|size| Level::new(size, usual));
+        let of_unit = |_| {
+            machine
+                .l1
+                .map(|size| Level::new(size, usual, machine.has_prefetcher))
+        };
         Self {
             l1: (0..machine.units).flat_map(of_unit).collect(),
-            l2: Level::new(machine.l2, usual),
+            l2: Level::new(machine.l2, usual, machine.has_prefetcher),
             dram: SimpleMemory::new(machine.dram_latency, machine.dram_ticks_per_line),
             l2_latency: machine.l2_latency,
         }
@@ -138,13 +156,13 @@ impl CacheMemory {
         match level.cache.look_up(line, now) {
             0 => {
                 of_l1.hits += 1;
-                counts.prefetch.useful += u64::from(level.unused.remove(&line));
+                counts.prefetch.useful += level.take_unused(line);
                 return Found::Hit;
             }
             NOT_IN_FLIGHT => {}
             arrival => {
                 of_l1.merged += 1;
-                counts.prefetch.late += u64::from(level.unused.remove(&line));
+                counts.prefetch.late += level.take_unused(line);
                 return Found::Later {
                     arrival,
                     fetches_l1: false,
@@ -161,7 +179,7 @@ impl CacheMemory {
             return Found::Full(Full::L2);
         };
         let level = &mut self.l1[2 * unit + kind];
-        counts.prefetch.useless += u64::from(level.unused.remove(&line));
+        counts.prefetch.useless += level.take_unused(line);
         match kind {
             0 => counts.node_l1.misses += 1,
             _ => counts.triangle_l1.misses += 1,
@@ -212,7 +230,7 @@ impl CacheMemory {
         let level = &mut self.l1[2 * unit + kind];
         level.cache.enter(line, now, arrival);
         level.mshrs.enter(arrival);
-        level.fetched_by.insert(line, eye);
+        level.note(line, eye);
     }
 
     /// Prefetched lines that no ray requested, at the end.
@@ -237,7 +255,7 @@ impl CacheMemory {
                 let arrival = self.dram.read(now);
                 self.l2.cache.enter(line, now, arrival);
                 self.l2.mshrs.enter(arrival);
-                self.l2.fetched_by.insert(line, eye);
+                self.l2.note(line, eye);
                 (arrival, true)
             }
             arrival => {

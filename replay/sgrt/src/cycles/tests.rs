@@ -273,6 +273,7 @@ fn machines() -> impl Strategy<Value = Machine> {
             dram_latency,
             dram_ticks_per_line,
             tile_buffers,
+            has_prefetcher: true,
         }
     })
 }
