@@ -34,6 +34,7 @@ mod layers;
 mod motion;
 mod parts;
 mod records;
+mod shading_reuse;
 mod skips;
 
 use captured::*;

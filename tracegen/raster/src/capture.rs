@@ -2,7 +2,7 @@
 
 use super::backend::{CaptureBackend, Fragments, RecordRequest, View};
 use super::cascades;
-use super::draws::{DrawCall, DrawList};
+use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::geometry;
@@ -66,7 +66,9 @@ impl CaptureJob<'_> {
             };
             self.draws.calls.iter().filter_map(object).collect()
         };
-        Ok(self.planner.plan(views, objects)?)
+        let mut calls = self.draws.calls.iter();
+        let blends = calls.any(|call| call.mode == DrawMode::Blended);
+        Ok(self.planner.plan(views, blends, objects)?)
     }
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds the draws
@@ -128,6 +130,11 @@ impl CaptureJob<'_> {
         )?)
     }
 
+    /// Whether colours are drawn while records are made: for pictures, or because another eye takes them.
+    fn draws_pictures(&self) -> bool {
+        self.shaded || self.planner.settings().shading_reuse.is_some()
+    }
+
     /// The eyes of a frame.
     pub fn rig(&self, views: &FrameViews) -> Rig {
         let eye = |eye: &Eye| visibility::Eye {
@@ -178,7 +185,7 @@ impl CaptureJob<'_> {
             backend.render(self.draws, &view, tile, None)?;
             let recording = RecordRequest {
                 fragments: self.fragments,
-                picture: self.shaded,
+                picture: self.draws_pictures(),
                 sink: &mut |_| Ok(()),
             };
             backend.render(self.draws, &view, tile, Some(recording))?;
@@ -272,7 +279,7 @@ impl CaptureJob<'_> {
                 view,
                 skip_regions: self.skips.regions,
                 fragments: self.fragments,
-                picture: self.shaded,
+                picture: self.draws_pictures(),
             };
             let recorded = recorder.capture_pass(&mut capturer)?;
             counts += recorded.counts;

@@ -86,7 +86,7 @@ pub struct RasterArgs {
     /// chooses the least error whose median frame time stays within the budget.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
           conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
-                                "cull_distance", "cull_px", "far_field", "foveate",
+                                "cull_distance", "cull_px", "reuse_shading", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
     pub(super) auto: Option<Budget>,
     #[command(flatten)]
@@ -95,7 +95,7 @@ pub struct RasterArgs {
     /// followed by exceptions for single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. `--auto`
     /// prints its choice in this form.
     #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
-          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
+          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "reuse_shading", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
     pub(super) technique: Option<Schedule>,
     #[command(flatten)]
@@ -219,10 +219,11 @@ impl RasterArgs {
 
     /// Refuses options that depend on the depth test.
     pub(super) fn check_without_depth_test(&self) -> anyhow::Result<()> {
-        ensure!(
-            !self.techniques.has_far_field(),
-            "--hsr none: expected every fragment to be drawn, found --far-field, whose layers hold only what the depth of others leaves open"
-        );
+        if let Some(flag) = self.techniques.layers_by_depth() {
+            bail!(
+                "--hsr none: expected every fragment to be drawn, found {flag}, whose layers hold only what the depth of others leaves open"
+            );
+        }
         ensure!(
             self.auto.is_none(),
             "--hsr none: expected techniques by their own options, found --auto, which measures frames with the depth test"

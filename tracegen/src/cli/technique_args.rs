@@ -17,6 +17,7 @@ use techniques::distance::DistanceCull;
 use techniques::foveation::MODES;
 use techniques::gaze::GazeSample;
 use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
+use techniques::shading_reuse::ShadingReuse;
 use visibility::Culling;
 
 /// Techniques of a capture.
@@ -55,6 +56,11 @@ pub struct TechniqueArgs {
     /// other).
     #[arg(long)]
     multiview: bool,
+    /// Let the right eye take the colour of surfaces that the left eye has shaded, where the left eye's pixels around the
+    /// place differ by at most this much (of the square root of linear light, 0 to 1) [default with the flag alone: 0.02].
+    #[arg(long, value_name = "CONTRAST", num_args = 0..=1, require_equals = true, default_missing_value = "0.02",
+          conflicts_with_all = ["multiview", "far_field", "foveate"])]
+    reuse_shading: Option<f32>,
     /// Draw everything beyond a distance once for both eyes. The distance is given in metres (7.5), as the
     /// largest error in pixels (1px), or as the distance of least cost within an error (least-work:2px;
     /// least-work alone means 1px).
@@ -153,9 +159,10 @@ impl FromStr for RatesFlag {
 }
 
 impl TechniqueArgs {
-    /// Whether far geometry has its own layer.
-    pub fn has_far_field(&self) -> bool {
-        self.far_field.is_some()
+    /// The first flag whose layers hold only what the depth of others leaves open.
+    pub fn layers_by_depth(&self) -> Option<&'static str> {
+        let far_field = self.far_field.map(|_| "--far-field");
+        far_field.or(self.reuse_shading.map(|_| "--reuse-shading"))
     }
 
     /// Files that the flags refer to.
@@ -174,6 +181,7 @@ impl TechniqueArgs {
             (self.hidden_area_mask, "--hidden-area-mask"),
             (self.hidden_area_mesh.is_some(), "--hidden-area-mesh"),
             (self.multiview, "--multiview"),
+            (self.reuse_shading.is_some(), "--reuse-shading"),
             (self.far_field.is_some(), "--far-field"),
             (self.foveate.is_some(), "--foveate"),
         ];
@@ -200,6 +208,7 @@ impl TechniqueArgs {
             distance_cull: (self.cull_distance.map(DistanceCull::Metres))
                 .or(self.cull_px.map(DistanceCull::Pixels)),
             half_rate: None,
+            shading_reuse: (self.reuse_shading).map(|contrast| ShadingReuse { contrast }),
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
                 split,
                 variant: self.far_field_variant,

@@ -39,7 +39,8 @@ pub struct Counted {
     /// Attributes of the vertices.
     pub vertex_bytes: u64,
     /// Colour of layers and pictures, written and, if pictures are composed of layers, read again; depth that
-    /// occlusion culling writes and reads. Depth that stays in a tile buffer is not included.
+    /// occlusion culling writes and reads; colour and depth that shading reuse reads of the other eye, whose depth is
+    /// written for it. Depth that stays in a tile buffer is not included.
     pub picture_bytes: u64,
     /// Views, lists of draws, and transforms of draws that move.
     pub uploaded_bytes: u64,
@@ -100,7 +101,11 @@ fn picture_bytes(plan: &FramePlan, occludes: bool) -> u64 {
             read + area(*size_px)
         }
     });
-    (written + depths + composed.sum::<u64>()) * PIXEL_BYTES
+    let reused: u64 = (0..layers.len())
+        .filter(|layer| plan.is_reused(*layer))
+        .map(|layer| 3 * layers[layer])
+        .sum();
+    (written + depths + reused + composed.sum::<u64>()) * PIXEL_BYTES
 }
 
 /// Texture bytes of a trace's frames, in order; see [`Counted::texture_bytes`].

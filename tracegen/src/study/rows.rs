@@ -6,6 +6,7 @@ use formats::view::Hmd;
 use techniques::distance::DistanceCull;
 use techniques::foveation::{MODES, Mode};
 use techniques::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
+use techniques::shading_reuse::ShadingReuse;
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
@@ -43,6 +44,8 @@ pub enum Setting {
     Distance,
     /// How often a frame is rendered.
     Rate,
+    /// What the right eye takes of the left eye's colours.
+    ShadingReuse,
     /// Where and how both eyes share a picture of the far field.
     FarField,
     /// How the periphery is shaded more coarsely.
@@ -189,6 +192,13 @@ const TECHNIQUES: &[Switch] = &[
         |s| s.half_rate = Some(Reprojection::Depth),
     ),
     Switch(
+        "shading-reuse",
+        "Shading reuse between the eyes",
+        false,
+        Setting::ShadingReuse,
+        |s| s.shading_reuse = Some(ShadingReuse::default()),
+    ),
+    Switch(
         "far-field",
         "Mono far field, 1 px",
         false,
@@ -220,6 +230,20 @@ const TECHNIQUES: &[Switch] = &[
 
 /// Other settings of these techniques, for searches.
 const VARIANTS: &[Switch] = &[
+    Switch(
+        "shading-reuse-0.01",
+        "Shading reuse between the eyes, least contrast",
+        false,
+        Setting::ShadingReuse,
+        |s| s.shading_reuse = Some(ShadingReuse { contrast: 0.01 }),
+    ),
+    Switch(
+        "shading-reuse-0.05",
+        "Shading reuse between the eyes, more contrast",
+        false,
+        Setting::ShadingReuse,
+        |s| s.shading_reuse = Some(ShadingReuse { contrast: 0.05 }),
+    ),
     Switch(
         "far-field-0.5px",
         "Mono far field, 0.5 px",

@@ -18,6 +18,7 @@ mod patch;
 pub mod plan;
 mod planner;
 pub mod settings;
+pub mod shading_reuse;
 pub mod skips;
 pub mod start;
 pub mod timewarp;

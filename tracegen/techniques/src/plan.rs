@@ -88,6 +88,7 @@ impl FramePlan {
             self.layers.iter().any(|layer| match &layer.start {
                 Start::Behind(openings) => openings.iter().any(|opening| opening.nearer == number),
                 Start::Composed(made) => made.nearer == number || made.farther == number,
+                Start::Reused(reuse) => reuse.from == number,
                 Start::Sky | Start::Nearer { .. } => false,
             })
         };
@@ -112,7 +113,11 @@ impl FramePlan {
     /// Render passes of frame `number`, one per layer.
     pub fn passes(&self, number: u32) -> Vec<Pass> {
         let pass = |(index, layer): (usize, &Layer)| {
-            let is_main = self.is_picture(index) && layer.start == Start::Sky;
+            let is_main = match layer.start {
+                Start::Sky => self.is_picture(index) || self.is_reused(index),
+                Start::Reused(_) => true,
+                _ => false,
+            };
             Pass {
                 frame: number,
                 kind: if is_main {
@@ -127,6 +132,12 @@ impl FramePlan {
             }
         };
         self.layers.iter().enumerate().map(pass).collect()
+    }
+
+    /// Whether another eye's layer takes colours of this layer.
+    pub fn is_reused(&self, layer: usize) -> bool {
+        let mut starts = self.layers.iter().map(|layer| &layer.start);
+        starts.any(|start| matches!(start, Start::Reused(reuse) if reuse.from == layer))
     }
 
     /// Whether a layer is the unmodified picture of an eye.

@@ -7,7 +7,7 @@ use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
 use crate::plan::{FramePlan, PictureSource};
-use crate::{Settings, hidden_area};
+use crate::{Settings, hidden_area, shading_reuse};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
 
@@ -45,6 +45,7 @@ impl Planner {
         settings.check(hmd)?;
         let needs_both = [
             ("far field", settings.far_field.is_some()),
+            ("shading reuse", settings.shading_reuse.is_some()),
             ("multiview", settings.multiview),
         ];
         if let Some((what, _)) = needs_both.into_iter().find(|(_, asked)| *asked)
@@ -111,24 +112,30 @@ impl Planner {
         far_field.view(&stereo, MAX_LAYER_PX, objects)
     }
 
-    /// Plans a frame; `objects` returns its draws, for techniques that depend on them.
+    /// Plans a frame of a scene that `blends` some draws or none; `objects` returns its draws, for techniques that depend
+    /// on them.
     ///
     /// # Errors
     /// See [`Self::check_views`].
     pub fn plan(
         &self,
         views: &FrameViews,
+        blends: bool,
         objects: impl FnOnce() -> Vec<Object>,
     ) -> Result<FramePlan, FarFieldError> {
         if self.settings.reprojects(views.frame) {
             return Ok(FramePlan::default());
         }
-        if let Some(far) = self.far_view(views, objects)? {
+        let size_px = self.hmd.eye_size_px;
+        let masks = || {
             let masks = self.patches([0.0; 2]);
-            let mask = |eye: usize| masks[eye].patches.first().and_then(|p| p.mask.clone());
-            let size_px = self.hmd.eye_size_px;
-            let masks = [mask(0), mask(1)];
-            return Ok(far_field::plan::plan(&far, views, size_px, masks));
+            [0, 1].map(|eye: usize| masks[eye].patches.first().and_then(|p| p.mask.clone()))
+        };
+        if let Some(far) = self.far_view(views, objects)? {
+            return Ok(far_field::plan::plan(&far, views, size_px, masks()));
+        }
+        if let Some(reuse) = self.settings.shading_reuse {
+            return Ok(shading_reuse::plan(reuse, views, size_px, masks(), blends));
         }
         let time_s = views.frame as f32 / self.fps;
         let gaze = (self.settings.foveation.as_ref())

@@ -4,6 +4,7 @@ use crate::distance::DistanceCull;
 use crate::error::SettingsError;
 use crate::gaze::{self, Gaze};
 use crate::hidden_mesh::HiddenMesh;
+use crate::shading_reuse::ShadingReuse;
 use formats::view::Hmd;
 use serde::{Deserialize, Serialize};
 use visibility::Culling;
@@ -29,6 +30,9 @@ pub struct Settings {
     /// Whether every other frame is reprojected from the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_rate: Option<Reprojection>,
+    /// Colours of the left eye that the right eye takes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shading_reuse: Option<ShadingReuse>,
     /// One picture of far geometry for both eyes.
     pub far_field: Option<FarField>,
     /// Coarser shading in the periphery.
@@ -156,16 +160,34 @@ impl Settings {
             distance.check()?;
         }
         if self.half_rate == Some(Reprojection::Depth)
-            && (self.foveation.is_some() || self.far_field.is_some() || self.multiview)
+            && (self.foveation.is_some()
+                || self.far_field.is_some()
+                || self.shading_reuse.is_some()
+                || self.multiview)
         {
             return Err(SettingsError {
                 what: "half rate by depth",
                 expected: "pictures that are one layer each, which has their depth".into(),
-                found: "foveation, a far field or multiview".into(),
+                found: "foveation, a far field, shading reuse or multiview".into(),
             });
         }
         if let Some(foveation) = &self.foveation {
             foveation.check(hmd)?;
+        }
+        if let Some(reuse) = self.shading_reuse {
+            reuse.check()?;
+            let others = [
+                ("foveation", self.foveation.is_some()),
+                ("a far field", self.far_field.is_some()),
+                ("multiview", self.multiview),
+            ];
+            if let Some((other, _)) = others.into_iter().find(|(_, asked)| *asked) {
+                return Err(SettingsError {
+                    what: "shading reuse",
+                    expected: "eyes that are drawn one after the other, each as one picture".into(),
+                    found: other.into(),
+                });
+            }
         }
         if let Some(far_field) = &self.far_field {
             far_field.check()?;

@@ -1,5 +1,6 @@
 //! Initial contents of a layer.
 
+use crate::shading_reuse::Reuse;
 use glam::{Mat3, Mat4};
 
 /// Initial contents of a layer.
@@ -17,6 +18,8 @@ pub enum Start {
     Behind([Opening; 2]),
     /// A nearer layer of the same view over a farther layer of another view.
     Composed(Composition),
+    /// The sky, and over it surfaces that another eye's layer has shaded.
+    Reused(Reuse),
 }
 
 /// Pixels of a farther layer that a nearer layer leaves open: those without a draw, and the pixels around

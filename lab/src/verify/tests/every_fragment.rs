@@ -59,7 +59,9 @@ fn nothing_is_recorded_where_a_mask_lets_nothing_be_drawn() {
     let whole = capture_all(&baseline(SIZE_PX, BOTH), &scene, 0, BUDGET);
     assert!(masked.pictures_match);
     for pass in 0..2 {
-        let plan = planner.plan(&views(&scene, SIZE_PX), Vec::new).unwrap();
+        let plan = planner
+            .plan(&views(&scene, SIZE_PX), false, Vec::new)
+            .unwrap();
         let mask = plan.layers[pass].mask.as_ref().expect("a mask");
         let open = |&([x, y], _): &([u32; 2], u32)| mask.flags()[(y * SIZE_PX[0] + x) as usize];
         let (masked, whole) = (recorded(&masked, pass), recorded(&whole, pass));

@@ -18,7 +18,7 @@ fn far(split: Split, variant: Variant) -> Settings {
 }
 
 /// A corridor around the camera, closed at its end, with opaque, masked and blended objects.
-fn corridor() -> Scene {
+pub(super) fn corridor() -> Scene {
     let quad = |corners: [[f32; 3]; 4], material| {
         let positions: Vec<Vec3> = corners.map(Vec3::from_array).into();
         let normal = (positions[1] - positions[0])
@@ -97,14 +97,14 @@ fn corridor() -> Scene {
 }
 
 /// A rendered frame.
-struct RenderedFrame {
-    pictures: Vec<Vec<u8>>,
-    /// Depths of each layer; none without a far field.
-    depths: Vec<Vec<f32>>,
+pub(super) struct RenderedFrame {
+    pub(super) pictures: Vec<Vec<u8>>,
+    /// Depths of each layer.
+    pub(super) depths: Vec<Vec<f32>>,
     plan: techniques::FramePlan,
 }
 
-fn draw(
+pub(super) fn draw(
     backend: &mut Lavapipe,
     scene: &Scene,
     draws: &DrawList,

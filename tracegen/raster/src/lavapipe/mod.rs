@@ -256,6 +256,7 @@ impl Lavapipe {
                 let farther = self.target(composition.farther)?;
                 Some(starts.composed(gpu, composition, nearer, farther))
             }
+            Start::Reused(reuse) => Some(starts.reused(gpu, reuse, self.target(reuse.from)?)),
         })
     }
 

@@ -6,6 +6,7 @@ use super::targets::LayerTarget;
 use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use glam::{Mat3, Mat4};
+use techniques::shading_reuse::Reuse;
 use techniques::start::{Composition, Opening};
 
 /// Pipelines that draw the initial contents of layers.
@@ -13,6 +14,7 @@ pub struct Starts {
     nearer: Pipeline,
     behind: Pipeline,
     composed: Pipeline,
+    reused: Pipeline,
 }
 
 /// A pipeline over the whole target, with the layout of its only group.
@@ -51,7 +53,7 @@ impl Starts {
     /// # Errors
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
-        gpu.checked("compiling the shader of the far field", || {
+        gpu.checked("compiling the shader of initial contents", || {
             let module = gpu.module("starts", include_str!("../shaders/starts.wgsl"));
             let make = |entry_point, textures: &[(u32, wgpu::TextureSampleType)]| {
                 Pipeline::new(gpu, &module, entry_point, textures)
@@ -63,6 +65,7 @@ impl Starts {
                     "fragment_composed",
                     &[(1, DEPTH), (3, COLOR), (4, COLOR), (5, DEPTH)],
                 ),
+                reused: make("fragment_reused", &[(1, DEPTH), (3, COLOR)]),
             }
         })
     }
@@ -113,6 +116,19 @@ impl Starts {
             &farther.depth_view,
         ];
         self.composed.drawn(gpu, &data, &textures, false)
+    }
+
+    /// Surfaces that another eye's layer, given with its target, has shaded.
+    pub fn reused(&self, gpu: &Gpu, reuse: &Reuse, from: &LayerTarget) -> Drawn<'_> {
+        let [own, other] = reuse.depth_of;
+        let mut data = StartData {
+            from_farther_clip: reuse.from_clip.to_cols_array_2d(),
+            ends: [reuse.nearest, 0.0, 0.0, reuse.contrast],
+            ..bytemuck::Zeroable::zeroed()
+        };
+        data.maps[0][0] = [own[0], own[1], other[0], other[1]];
+        let textures = [&from.depth_view, &from.color.view];
+        self.reused.drawn(gpu, &data, &textures, true)
     }
 }
 

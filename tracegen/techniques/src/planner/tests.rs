@@ -5,6 +5,8 @@ use crate::hidden_mesh::HiddenMesh;
 use crate::layer::Layer;
 use crate::plan::{Filter, PicturePart};
 use crate::settings::{FarField, Foveation, FoveationKind, Rates, Reprojection, Split, Variant};
+use crate::shading_reuse::ShadingReuse;
+use formats::textrace::PassKind;
 use formats::view::{EyeView, FovTangents};
 
 const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
@@ -34,7 +36,9 @@ fn foveated(kind: FoveationKind, gaze: [f32; 2], hidden_area_mask: bool) -> Sett
 fn plan(settings: &Settings, hmd: &Hmd) -> FramePlan {
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
     let planner = Planner::new(settings, hmd, lenses, BOTH, 72.0).unwrap();
-    planner.plan(&FrameViews::default(), Vec::new).unwrap()
+    planner
+        .plan(&FrameViews::default(), false, Vec::new)
+        .unwrap()
 }
 
 /// All settings that result in layers, each with a gaze straight ahead and one in a corner.
@@ -181,7 +185,7 @@ fn pixels_of_a_layer_have_the_directions_of_the_pictures_pixels() {
         let lenses = hmd.fov.map(|fov| Lens::of(&fov));
         let plan = Planner::new(&settings, &hmd, lenses, BOTH, 72.0)
             .unwrap()
-            .plan(&views, Vec::new)
+            .plan(&views, false, Vec::new)
             .unwrap();
         for picture in &plan.pictures {
             let PictureSource::Composed { parts, .. } = picture else {
@@ -323,7 +327,7 @@ fn eyes_without_a_possible_far_field_are_an_error_of_the_plan() {
         frame: 3,
         eyes: [view(-80.0), view(80.0)],
     };
-    planner.plan(&views, Vec::new).unwrap_err();
+    planner.plan(&views, false, Vec::new).unwrap_err();
 }
 
 #[test]
@@ -338,6 +342,7 @@ fn layers_are_reused_while_the_gaze_is_unchanged() {
                 frame,
                 ..FrameViews::default()
             },
+            false,
             Vec::new,
         );
         plan.unwrap()
@@ -395,6 +400,50 @@ fn a_hidden_area_mesh_replaces_the_mask_of_the_lens() {
 }
 
 #[test]
+fn the_right_eye_starts_with_what_the_left_one_shaded() {
+    let hmd = hmd([64, 64]);
+    let settings = Settings {
+        shading_reuse: Some(ShadingReuse::default()),
+        ..Settings::default()
+    };
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
+    let layers = |blends| {
+        let plan = planner.plan(&FrameViews::default(), blends, Vec::new);
+        let passes = plan.unwrap().passes(0).into_iter();
+        let kinds = passes.map(|pass| (pass.kind, pass.eye.unwrap(), pass.layer));
+        kinds.collect::<Vec<_>>()
+    };
+    let eyes = [
+        (PassKind::Main, Eye::Left, 0),
+        (PassKind::Main, Eye::Right, 0),
+    ];
+    assert_eq!(layers(false), eyes);
+    // What is blended goes over the left eye's picture after the right eye took colours of it.
+    assert_eq!(layers(true)[..2], eyes);
+    assert_eq!(layers(true)[2..], [(PassKind::Layer, Eye::Left, 1)]);
+
+    let refused = |settings: Settings, eyes: &[Eye]| {
+        let planner = Planner::new(&settings, &hmd, lenses, eyes, 72.0);
+        planner.unwrap_err().to_string()
+    };
+    assert!(refused(settings.clone(), &[Eye::Right]).contains("both eyes"));
+    let multiview = Settings {
+        multiview: true,
+        ..settings
+    };
+    assert!(refused(multiview, BOTH).contains("one after the other"));
+    for contrast in [-0.1, 1.1, f32::NAN] {
+        let shading_reuse = Some(ShadingReuse { contrast });
+        let settings = Settings {
+            shading_reuse,
+            ..Settings::default()
+        };
+        assert!(refused(settings, BOTH).contains("0 to 1"), "{contrast}");
+    }
+}
+
+#[test]
 fn at_half_rate_every_other_frame_has_no_layers() {
     let hmd = hmd([64, 64]);
     let settings = Settings {
@@ -408,7 +457,7 @@ fn at_half_rate_every_other_frame_has_no_layers() {
             frame,
             ..FrameViews::default()
         };
-        planner.plan(&views, Vec::new).unwrap().layers.len()
+        planner.plan(&views, false, Vec::new).unwrap().layers.len()
     };
     assert_eq!([0, 1, 2, 3].map(layers), [2, 0, 2, 0]);
 }
