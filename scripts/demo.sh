@@ -27,7 +27,7 @@ trace_and_reproject() {
         "$bin/tracegen" rays "$scene" --size 512x512 -o "$out/$scene.raytrace"
         set -- "$@" "$out/$scene.raytrace"
     done
-    say "reproject: 6 scenes, the default rule and the paper's"
+    say "reproject: 6 scenes, the default rule and plain reuse"
     "$bin/replay" reproject "$@" --html "$out/reprojection.html" > "$out/reprojection.txt"
 }
 

@@ -23,7 +23,7 @@ TIMES = [
     ("frames", "1/4 of the frames, cold", "a quarter of 16 frames, each from empty caches", "all frames"),
     ("frames", "1/4 of the frames, warmed", "a quarter of 16 frames, each after the one before it", "all frames"),
 ]
-RULES = ["none", "depth=0.02+row=0.02+object+opaque+triangles", "depth=0.02+object+opaque+silhouette+triangle"]
+RULES = ["none", "depth=0.02+row=0.02+object+opaque+gap+triangles+shadow-edge", "depth=0.02+object+opaque+silhouette+triangle"]
 RAY_SCENES = ["chess", "music-box"]
 
 

@@ -34,8 +34,8 @@ def run(study):
         saved, flip = techniques(study, name, key)
         add(name, f"{saved} of {what}", flip if float(flip.split()[-1]) else "none", f"{len(SCENES)} scenes", "techniques")
     reuse = [row for row in table("reprojection") if row["run"] == "chosen"]
-    for key, change in (("performance", "{} more frames/s"), ("energy", "costs {} energy")):
-        add("reprojection", change.format(ends(100 * (float(row[f"relative_{key}"]) - 1) for row in reuse)),
+    for key, change, sign in (("performance", "{} more frames/s", 1), ("energy", "{} of the energy", -1)):
+        add("reprojection", change.format(ends(sign * 100 * (float(row[f"relative_{key}"]) - 1) for row in reuse)),
             ends((row["flip_mean"] for row in reuse), "", 4), f"{len(reuse)} scenes", "reprojection")
     programs = [row for row in table("applications") if row["Z2 STA saves %"] not in ("", "-")]
     add("Z2 STA, programs", f"{ends(row['Z2 STA saves %'] for row in programs)} of texture bytes", "none", f"{len(programs)} programs", "applications")

@@ -73,7 +73,7 @@ def measure(study, trace, kinds, machine=""):
     """The runs of all prefetchers."""
     name = f"{trace.stem}-{abs(hash((kinds, machine)))}.toml"
     (study.work / name).write_text("".join(f"{line.strip()}\n" for line in machine.split(",")))
-    words = ["reproject --timing cycle --rule none --threads 1", "--config", study.work / name, *(["--rays", kinds] if kinds else [])]
+    words = ["reproject --timing cycle --preset sgrt-paper --reuse primary --threads 1", "--config", study.work / name, *(["--rays", kinds] if kinds else [])]
     base = study.json(*words, trace)
     return {prefetcher: Run(study.json(*words, "--prefetch", prefetcher, trace), base) for prefetcher in PREFETCHERS}
 
@@ -94,7 +94,7 @@ def run(study):
                     machines[machine].append(runs)
             study.say(scene)
             study.drop(*traces.values())
-    detail = f"tracegen rays SCENE --size {size} --all-columns --bounces 1, replay reproject --timing cycle --rule none --rays KIND --prefetch NAME --json"
+    detail = f"tracegen rays SCENE --size {size} --all-columns --bounces 1, replay reproject --timing cycle --preset sgrt-paper --reuse primary --rays KIND --prefetch NAME --json"
     study.write("ray-prefetch", detail, "scene | rays | eyes | prefetcher | lines issued k | accuracy % | coverage % | late % | dropped % | more DRAM bytes % | "
                 "of the other eye % | speed", table)
     summary = []

@@ -15,7 +15,7 @@ WORKLOADS = {
     "normal maps": "--normal-maps",
 }
 RUNS = {
-    "hits": "--rule none --reuse primary", "shadows": "--rule none --reuse shadow", "colours": "--rule none --reuse color", "on-chip": "--preset on-chip",
+    "hits": "--preset sgrt-paper --reuse primary", "shadows": "--preset sgrt-paper --reuse shadow", "colours": "--preset sgrt-paper", "default": "",
 }
 
 
@@ -44,7 +44,7 @@ def run(study):
             table.append(row)
     study.write(
         "ray-workloads",
-        f"tracegen rays SCENE --size {size} --visits OPTIONS, replay reproject --rule none --reuse primary|shadow|color, --preset on-chip",
+        f"tracegen rays SCENE --size {size} --visits OPTIONS, replay reproject [--preset sgrt-paper --reuse primary|shadow|color]",
         " | ".join([
             "scene | workload | rays per pixel | shadow % | occlusion % | diffuse % | mirror and glass % | steps per ray",
             *(f"{name}: performance | {name}: energy | {name}: FLIP" for name in RUNS)]), table)

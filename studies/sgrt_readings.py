@@ -8,7 +8,6 @@ PAPER_SIZE = "2048x1024"
 SIZES = ["512x512", "1024x1024", PAPER_SIZE]
 SETS = ["calibration", "test"]
 READING = ["scope", "reuse", "rule", "row_test", "gbuffer"]
-DEFAULT = ["whole frame", "primary", "default", "arrivals", "tile"]
 
 
 def by_reading(rows):
@@ -40,8 +39,7 @@ def every_reading(study, readings):
         "energy at 14 nm | scenes that save energy", table)
 
 
-def figure_3(study, rows):
-    default = {row["scene"]: row for row in rows if [row[key] for key in READING] == DEFAULT}
+def figure_3(study, rows, default):
     chosen = [row for row in rows if row["chosen"] == "true"]
     table = []
     for row in sorted(chosen, key=lambda row: (row["set"], SGRT_SCENES.index(row["scene"]))):
@@ -59,6 +57,7 @@ def run(study):
     for size in SIZES:
         traces = [study.rays(scene, f"--size {size}", name=f"{size}/{scene}") for scene in SGRT_SCENES]
         rows = study.csv("readings", *traces, "--calibrate teapot,chess,music-box")
+        default = {row["scene"]: row for row in study.csv("reproject", *traces) if row["run"] == "chosen"}
         study.drop(*traces)
         readings = by_reading(rows)
         fits = {number: list(distances(of)) for number, of in readings.items()}
@@ -66,7 +65,7 @@ def run(study):
         sizes.append([size, best, *(readings[best][0][key] for key in READING[:3]), *(f"{x:.3f}" for x in fits[best])])
     # The last size is the paper's.
     every_reading(study, readings)
-    figure_3(study, rows)
+    figure_3(study, rows, default)
     study.write(
         "sgrt-sizes", "replay readings at each size per eye",
         "size per eye | closest reading | measured of | reused | rule | from the paper: calibration | test scenes", sizes)

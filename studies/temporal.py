@@ -6,7 +6,7 @@ OPTIONS = {"--size": dict(default="512x512", help="pixels per eye (512x512)")}
 SCENES = ["teapot", "chess", "music-box", "meadow", "crytek-sponza", "stk-black-forest"]
 # First frames of the pairs: slow, and at the fastest turn of the first seconds.
 PLACES = [10, 60, 110]
-RULES = {"every arrival reused": "--rule none --reuse shadow", "`--preset on-chip`": "--preset on-chip"}
+RULES = {"every arrival reused": "--preset sgrt-paper --reuse shadow", "default": ""}
 # Figures of a row, their decimals, and how they are averaged.
 FIGURES = {
     "left_reused_pct": (0, mean), "right_reused_pct": (0, mean), "relative_performance": (2, geometric_mean), "relative_energy": (2, geometric_mean),

@@ -55,11 +55,39 @@ const TEXTRACE_RUNS: &[(&str, &[&str])] = &[
 
 /// The same for ray traces.
 const RAYTRACE_RUNS: &[(&str, &[&str])] = &[
-    ("default", &[]),
-    ("plain", &["--rule", "none"]),
+    ("rows-on-chip", &[]),
+    (
+        "strict",
+        &[
+            "--preset",
+            "sgrt-paper",
+            "--reuse",
+            "primary",
+            "--rule",
+            "depth+row+object+opaque+triangles",
+        ],
+    ),
+    (
+        "plain",
+        &[
+            "--preset",
+            "sgrt-paper",
+            "--reuse",
+            "primary",
+            "--rule",
+            "none",
+        ],
+    ),
     (
         "shadows-reused",
-        &["--rule", "row+triangle", "--reuse", "shadow"],
+        &[
+            "--preset",
+            "sgrt-paper",
+            "--reuse",
+            "shadow",
+            "--rule",
+            "row+triangle",
+        ],
     ),
 ];
 

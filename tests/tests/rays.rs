@@ -46,6 +46,7 @@ fn a_reprojection_saves_work_and_reports_its_error() {
     let golden = root().join("traces/chess-rays.raytrace");
     let careful = reproject(&golden, &[]);
     let plain = reproject(&golden, &["--rule", "none"]);
+    let primary = reproject(&golden, &["--reuse", "primary"]);
     assert_eq!(careful["schema"], "replay.reproject/3");
     for report in [&careful, &plain] {
         assert!(figure(report, "relative_performance") > 1.0);
@@ -59,6 +60,25 @@ fn a_reprojection_saves_work_and_reports_its_error() {
     // In such a small picture silhouettes are many of the pixels; the target of 0.01 is for real sizes.
     assert!(figure(&plain, "flip_mean") > 2.0 * figure(&careful, "flip_mean"));
     assert!(figure(&careful, "flip_mean") < 0.02);
+    assert!(careful["result"]["work"]["rays"].as_u64() < primary["result"]["work"]["rays"].as_u64());
+}
+
+#[test]
+fn the_defaults_save_energy_and_time_with_little_error_on_every_scene_of_the_paper() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for scene in ["teapot", "chess", "car", "lab", "music-box", "meadow"] {
+        let path = folder.path().join(format!("{scene}.raytrace"));
+        let mut command = program("tracegen");
+        command.args(["rays", scene, "--size", "256x256", "-o"]);
+        run_ok(command.arg(&path));
+        let report = reproject(&path, &[]);
+        let [energy, flip, performance] = ["relative_energy", "flip_mean", "relative_performance"]
+            .map(|key| figure(&report, key));
+        assert!(energy < 1.0, "{scene}: energy {energy}");
+        assert!(flip < 0.01, "{scene}: FLIP {flip}");
+        assert!(performance > 1.0, "{scene}: performance {performance}");
+        fs::remove_file(path).expect("removable");
+    }
 }
 
 #[test]

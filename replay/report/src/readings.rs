@@ -97,7 +97,7 @@ fn scope_name(scope: Scope) -> &'static str {
 fn rule_name(reading: &Reading) -> &'static str {
     match reading.rule.to_string().as_str() {
         "none" => "none",
-        _ => "default",
+        _ => "strict",
     }
 }
 
@@ -289,7 +289,7 @@ impl ReadingsReport {
             p {
                 "The paper (Lee et al., \u{201c}Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for Virtual Reality "
                 "Applications\u{201d}) leaves open what its figure 3 measures and what a reused pixel takes over. Each reading "
-                "is one choice for each question. Nothing else is fitted: all constants of the hardware are the stated defaults."
+                "is one choice for each question. Nothing else is fitted: the constants of the hardware are those of --preset sgrt-paper."
             }
         };
         let mut page = Page::default();

@@ -96,12 +96,12 @@ pub(super) fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &G
 
 #[cfg(test)]
 mod tests {
-    use super::super::config::SgrtConfig;
+    use super::super::testing::rows_in_dram;
     use super::*;
 
     #[test]
     fn tiling_leaves_only_the_rows_in_dram() {
-        let g = SgrtConfig::default().gbuffer;
+        let g = rows_in_dram().gbuffer;
         let reads = Reads::ARRIVALS;
         let right = RightTile {
             tested: 1000,

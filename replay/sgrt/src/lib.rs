@@ -52,8 +52,11 @@ pub mod work;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-/// The default rule of `replay reproject`: the cheapest measured one with a right image well below a FLIP
-/// of 0.01 on every scene. Foliage needs `opaque`, because the trace does not record whether a re-tested
-/// cut-out lets the ray through. `triangles` reuses more than `triangle` on fine meshes, where the next
-/// pixel often shows another triangle.
-pub const DEFAULT_RULE: &str = "depth=0.02+row=0.02+object+opaque+triangles";
+/// The default rule of `replay reproject`: the cheapest measured one with a right image below a FLIP of 0.01 on
+/// every scene. Foliage needs `opaque`, because the trace does not record whether a re-tested cut-out lets the
+/// ray through. `triangles` reuses more than `triangle` on fine meshes, where the next pixel often shows another
+/// triangle. Near content needs `gap`, and reused shadow outcomes need `shadow-edge`.
+pub const DEFAULT_RULE: &str = "depth=0.02+row=0.02+object+opaque+gap+triangles+shadow-edge";
+
+/// What `replay reproject` reuses by default.
+pub const DEFAULT_REUSE: compose::Reuse = compose::Reuse::Shadow;

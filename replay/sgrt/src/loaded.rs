@@ -135,7 +135,7 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
-    /// Runs a rule, and the paper's plain reuse of every arrival, on the next frame of `tiles`.
+    /// Runs a rule, and plain reuse of every arrival, on the next frame of `tiles`.
     ///
     /// # Errors
     /// [`FrameError`] for a trace without the visits that are needed, or for a tile whose addresses cannot be read.

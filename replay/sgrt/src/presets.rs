@@ -17,23 +17,21 @@ pub struct Preset {
     pub parameters: &'static str,
 }
 
+/// The paper's storage: what detection reads of a left pixel goes through DRAM (section III), in full width.
+macro_rules! paper_storage {
+    () => {
+        "[gbuffer]\nobject_bytes = 4\ndetect_position_bytes = 12\nrows = \"dram\"\n"
+    };
+}
+
 /// The reading of the SGRT paper that comes closest to its figure 3 on the scenes that `replay readings` calibrates on.
-const SGRT_PAPER: Preset = Preset {
+pub const SGRT_PAPER: Preset = Preset {
     name: "sgrt-paper",
     title: "the reading of the SGRT paper that is closest to its figure 3: every arrival is reused, with its colour where the material \
-            looks the same from everywhere",
+            looks the same from everywhere; what detection reads goes through DRAM",
     rule: "none",
     reuse: Reuse::Color,
-    parameters: "",
-};
-
-/// Error detection without DRAM traffic. Its records are packed: a depth instead of a position, and an object number of 16 bits.
-static ON_CHIP: Preset = Preset {
-    name: "on-chip",
-    title: "detection that pays: the default rule and gap, shadow outcomes reused except at shadow edges, packed records, rows kept on chip",
-    rule: "depth=0.02+row=0.02+object+opaque+gap+triangles+shadow-edge",
-    reuse: Reuse::Shadow,
-    parameters: "[gbuffer]\nobject_bytes = 2\ndetect_position_bytes = 4\nrows = \"chip\"\n",
+    parameters: paper_storage!(),
 };
 
 /// The SGRT of Lee et al., "SGRT: A Mobile GPU Architecture for Real-Time Ray Tracing", HPG 2013. docs/models/sgrt.md lists
@@ -41,7 +39,10 @@ static ON_CHIP: Preset = Preset {
 static SGRT_2013: Preset = Preset {
     name: "sgrt-2013",
     title: "figure 3 on the SGRT of 2013: one box per issue cycle, four traversal units and an intersection unit per core",
-    parameters: "[tni]\ntrv_pipelines = 4\ntrv_cycles_per_step = 2\ntrv_cycles_per_wide_step = 8\nist_pipelines = 1\n",
+    parameters: concat!(
+        paper_storage!(),
+        "[tni]\ntrv_pipelines = 4\ntrv_cycles_per_step = 2\ntrv_cycles_per_wide_step = 8\nist_pipelines = 1\n"
+    ),
     ..SGRT_PAPER
 };
 
@@ -50,15 +51,18 @@ static SGRT_2013: Preset = Preset {
 static TNI_2011: Preset = Preset {
     name: "tni-2011",
     title: "figure 3 on the T&I engine of 2011: many traversal units with one adder and one multiplier each",
-    parameters: "[tni]\ntrv_pipelines = 24\ntrv_cycles_per_step = 12\ntrv_cycles_per_wide_step = 48\nist_pipelines = 4\n\
-                 rays_in_flight = 512\n\
-                 [cache]\nnode_l1_bytes = 65536\ntriangle_l1_bytes = 65536\nl2_bytes = 262144\n\
-                 [cycles]\nl1_mshrs = 64\n",
+    parameters: concat!(
+        paper_storage!(),
+        "[tni]\ntrv_pipelines = 24\ntrv_cycles_per_step = 12\ntrv_cycles_per_wide_step = 48\nist_pipelines = 4\n",
+        "rays_in_flight = 512\n",
+        "[cache]\nnode_l1_bytes = 65536\ntriangle_l1_bytes = 65536\nl2_bytes = 262144\n",
+        "[cycles]\nl1_mshrs = 64\n"
+    ),
     ..SGRT_PAPER
 };
 
 /// All presets.
-pub static PRESETS: [&Preset; 4] = [&SGRT_PAPER, &ON_CHIP, &SGRT_2013, &TNI_2011];
+pub static PRESETS: [&Preset; 3] = [&SGRT_PAPER, &SGRT_2013, &TNI_2011];
 
 /// The preset of a name.
 pub fn find(name: &str) -> Option<&'static Preset> {
@@ -76,7 +80,7 @@ pub fn help() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::config::SgrtConfig;
+    use super::super::config::{RowStorage, SgrtConfig};
     use super::super::rules::Rule;
     use super::*;
 
@@ -85,8 +89,17 @@ mod tests {
         for preset in PRESETS {
             let rule: Result<Rule, _> = preset.rule.parse();
             assert_eq!(rule.expect(preset.name).to_string(), preset.rule);
-            SgrtConfig::from_overrides(preset.parameters).expect(preset.name);
             assert!(std::ptr::eq(find(preset.name).expect("found"), preset));
+            // The paper's storage, whatever the defaults are.
+            let gbuffer = SgrtConfig::from_overrides(preset.parameters)
+                .expect(preset.name)
+                .gbuffer;
+            let bytes = [
+                gbuffer.object_bytes,
+                gbuffer.triangle_bytes,
+                gbuffer.detect_position_bytes,
+            ];
+            assert_eq!((bytes, gbuffer.rows), ([4, 4, 12], RowStorage::Dram));
         }
         assert!(find("sgrt").is_none());
     }

@@ -154,6 +154,7 @@ impl Reads {
 mod tests {
     use super::super::config::SgrtConfig;
     use super::super::rules::Rule;
+    use super::super::testing::rows_in_dram;
     use super::*;
 
     fn reads(rule: &str) -> Reads {
@@ -162,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_rule_is_charged_for_the_fields_and_the_rows_that_it_reads() {
-        let g = SgrtConfig::default().gbuffer;
+        let g = rows_in_dram().gbuffer;
         // Bytes per left pixel, bytes per record, and whether adjacent rows are fetched.
         for (rule, pixel, record, rows_beside) in [
             ("none", 12, 28, false),
@@ -173,7 +174,7 @@ mod tests {
             ("silhouette", 16, 32, true),
             ("triangle", 16, 32, false),
             ("triangles", 16, 32, true),
-            (crate::DEFAULT_RULE, 20, 36, true),
+            (crate::DEFAULT_RULE, 21, 37, true),
         ] {
             let r = reads(rule);
             assert_eq!(r.pixel_bytes(&g), pixel, "{rule}");
@@ -183,13 +184,19 @@ mod tests {
         }
         assert_eq!(
             reads(crate::DEFAULT_RULE).fetched_bytes(&g, 16, 18, 1),
-            20 * 18
+            21 * 18
+        );
+        // A depth, a short object number, a triangle number and shadow outcomes.
+        let packed = SgrtConfig::default().gbuffer;
+        assert_eq!(
+            reads(crate::DEFAULT_RULE).pixel_bytes(&packed),
+            4 + 2 + 4 + 1
         );
     }
 
     #[test]
     fn concurrent_tests_read_a_pixel_once() {
-        let g = SgrtConfig::default().gbuffer;
+        let g = rows_in_dram().gbuffer;
         assert_eq!(reads("depth+row").looked_up_bytes(&g), 5 * 12 + 2 * 4);
         assert_eq!(reads("none").looked_up_bytes(&g), 12);
     }

@@ -1,7 +1,9 @@
 //! Ray traces of scenes with known results, for tests.
 
+use super::config::SgrtConfig;
 use super::detect::intersect;
 use super::frame::{Frame, RaySource, TileError};
+use super::presets::SGRT_PAPER;
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::half::round3;
 use formats::raytrace::{
@@ -44,6 +46,11 @@ pub struct Placed {
     pub object: u32,
     /// Index of its material.
     pub material: u32,
+}
+
+/// The defaults with the paper's storage: rows in DRAM.
+pub fn rows_in_dram() -> SgrtConfig {
+    SgrtConfig::from_overrides(SGRT_PAPER.parameters).expect("a preset's parameters")
 }
 
 /// A hierarchy summary with 64-byte nodes.

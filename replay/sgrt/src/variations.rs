@@ -126,6 +126,7 @@ pub fn curve_rules() -> Vec<Rule> {
         "depth=0.02+object+triangle",
         "depth=0.02+object+triangles",
         "depth=0.02+object+opaque+triangle",
+        "depth=0.02+row=0.02+object+opaque+triangles",
         super::DEFAULT_RULE,
         "depth=0.02+object+opaque+silhouette+triangle",
     ]

@@ -8,6 +8,7 @@ use clap::Args;
 use formats::raytrace::Raytrace;
 use report::readings::{ReadingsReport, SceneReadings};
 use sgrt::loaded::LoadedTrace;
+use sgrt::presets::SGRT_PAPER;
 use shell::Progress;
 use sim::paper::sgrt as paper;
 use sim::result::{TraceId, scene_name};
@@ -31,7 +32,7 @@ pub(super) struct ReadingsArgs {
     /// one of those beside a scene of the paper].
     #[arg(long, value_name = "LABELS", value_delimiter = ',')]
     calibrate: Option<Vec<String>>,
-    /// Model parameters (TOML) that differ from the defaults.
+    /// Model parameters (TOML) that differ from those of `replay reproject --preset sgrt-paper`.
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
     /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
@@ -50,7 +51,7 @@ pub(super) struct ReadingsArgs {
 /// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
 pub fn run(args: &ReadingsArgs) -> Result<ExitCode> {
     args.threads.start()?;
-    let config = read_config(None, args.config.as_deref())?;
+    let config = read_config(Some(&SGRT_PAPER), args.config.as_deref())?;
     // A wrong --as is refused before the work.
     paper::values("", "", &args.paper_scenes)?;
     let inputs = args.files.iter().chain(&args.config);

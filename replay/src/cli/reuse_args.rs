@@ -3,11 +3,11 @@
 use super::choice::choice;
 use anyhow::Context;
 use clap::Args;
-use sgrt::DEFAULT_RULE;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::presets::{self, Preset};
 use sgrt::rules::{self, Rule};
+use sgrt::{DEFAULT_REUSE, DEFAULT_RULE};
 use std::path::{Path, PathBuf};
 
 /// What is reused, and the machine.
@@ -18,7 +18,7 @@ pub struct ReuseArgs {
     pub preset: Option<&'static Preset>,
     #[arg(long, value_name = "RULE", help = rule_help())]
     rule: Option<Rule>,
-    /// Values that a reprojected pixel reuses [default: primary]
+    /// Values that a reprojected pixel reuses [default: shadow]
     #[arg(long, value_parser = choice::<Reuse>())]
     reuse: Option<Reuse>,
     /// TOML file with model parameters; others keep their defaults
@@ -43,9 +43,9 @@ impl ReuseArgs {
         self.rule.clone().map_or_else(|| Ok(named.parse()?), Ok)
     }
 
-    /// What is reused: the user's, else the preset's, else primary hits.
+    /// What is reused: the user's, else the preset's, else the default.
     pub fn reuse(&self) -> Reuse {
-        let named = self.preset.map_or(Reuse::Primary, |preset| preset.reuse);
+        let named = self.preset.map_or(DEFAULT_REUSE, |preset| preset.reuse);
         self.reuse.unwrap_or(named)
     }
 

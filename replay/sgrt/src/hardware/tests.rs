@@ -3,7 +3,7 @@ use crate::detect::{PixelClass, decide};
 use crate::reproject::reproject;
 use crate::rows::RowNeeds;
 use crate::rules::Rule;
-use crate::testing::{Placed, View, frame, wall};
+use crate::testing::{Placed, View, frame, rows_in_dram, wall};
 use crate::ways::compare;
 use formats::raytrace::TraversalKind;
 
@@ -124,7 +124,7 @@ fn the_tile_buffer_saves_dram_traffic_and_energy() {
 fn detection_traffic_equals_the_bytes_that_its_rule_reads() {
     let frame = frame(&room(), View::default());
     let of = |rule| {
-        let e = compared(&frame, rule, Reuse::Primary, &SgrtConfig::default());
+        let e = compared(&frame, rule, Reuse::Primary, &rows_in_dram());
         e.reprojected.dram.gbuffer_bytes
     };
     // 40 rows form bands of 16, 16 and 8; each also fetches the adjacent rows.
@@ -133,13 +133,13 @@ fn detection_traffic_equals_the_bytes_that_its_rule_reads() {
     assert_eq!(of("none"), 12 * 2 * pixels);
     assert_eq!(of("triangle"), 16 * 2 * pixels);
     assert_eq!(of("depth"), 12 * (pixels + with_neighbours));
-    assert_eq!(of(crate::DEFAULT_RULE), 20 * (pixels + with_neighbours));
+    assert_eq!(of(crate::DEFAULT_RULE), 21 * (pixels + with_neighbours));
 }
 
 #[test]
 fn a_bandwidth_bound_frame_takes_the_time_of_its_dram_bytes() {
     let frame = frame(&room(), View::default());
-    let mut config = SgrtConfig::default();
+    let mut config = rows_in_dram();
     config.memory.bandwidth_gb_s = 0.001;
     let e = compared(&frame, "none", Reuse::Primary, &config);
     for run in [&e.reference, &e.reprojected, &e.whole_screen] {
@@ -177,7 +177,7 @@ fn eyes_that_need_more_rows_have_more_traffic() {
             ..View::default()
         };
         let frame = frame(&room(), view);
-        let e = compared(&frame, "none", Reuse::Primary, &SgrtConfig::default());
+        let e = compared(&frame, "none", Reuse::Primary, &rows_in_dram());
         e.reprojected.dram.gbuffer_bytes
     };
     assert!(of(10.0) > of(0.0), "{} {}", of(10.0), of(0.0));

@@ -6,13 +6,12 @@ use super::metric::{Metric, metric};
 use super::study::{Choice, Contribution, Study, StudyError};
 use formats::raytrace::{RayTile, RaytraceTables};
 use formats::view::Eye;
-use sgrt::DEFAULT_RULE;
-use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::frame::{RaySource, TileError};
 use sgrt::loaded::LoadedTrace;
 use sgrt::rules::Rule;
 use sgrt::variations::curve_rules;
+use sgrt::{DEFAULT_REUSE, DEFAULT_RULE};
 
 const RULE_FIGURES: [Metric; 4] = [
     metric("flip_mean", "mean FLIP of the right image", ""),
@@ -24,7 +23,7 @@ const RULE_FIGURES: [Metric; 4] = [
 pub const RULES: Study = Study {
     key: "rules",
     title: "Rules of reprojection",
-    about: "Which reprojected hits are rejected and traced again; primary hits are reused. Errors are against the right image traced in full.",
+    about: "Which reprojected hits are rejected and traced again; primary hits and shadow outcomes are reused. Errors are against the right image traced in full.",
     time: "modelled frame, over both eyes traced in full",
     reference: "trace everything",
     recommended: DEFAULT_RULE,
@@ -37,7 +36,7 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     let mut choices = Vec::new();
     for rays in &inputs.rays {
         let loaded = LoadedTrace::load(rays.source)?;
-        let curve = loaded.curve(&curve_rules(), &[Reuse::Primary], &SgrtConfig::default())?;
+        let curve = loaded.curve(&curve_rules(), &[DEFAULT_REUSE], &SgrtConfig::default())?;
         choices.extend(curve.into_iter().map(|point| {
             Choice {
                 name: point.rule.to_string(),
@@ -79,7 +78,7 @@ fn reuse(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     let config = SgrtConfig::default();
     let run = |source: &dyn RaySource, rule: &Rule| -> Result<(f64, f64), StudyError> {
         let loaded = LoadedTrace::load(source)?;
-        let outcome = loaded.run(rule, Reuse::Primary, &config)?.outcome;
+        let outcome = loaded.run(rule, DEFAULT_REUSE, &config)?.outcome;
         Ok((outcome.reuse_pct, outcome.relative_performance))
     };
     let mut choices = Vec::new();
