@@ -60,7 +60,9 @@ fn a_reprojection_saves_work_and_reports_its_error() {
     // In such a small picture silhouettes are many of the pixels; the target of 0.01 is for real sizes.
     assert!(figure(&plain, "flip_mean") > 2.0 * figure(&careful, "flip_mean"));
     assert!(figure(&careful, "flip_mean") < 0.02);
-    assert!(careful["result"]["work"]["rays"].as_u64() < primary["result"]["work"]["rays"].as_u64());
+    assert!(
+        careful["result"]["work"]["rays"].as_u64() < primary["result"]["work"]["rays"].as_u64()
+    );
 }
 
 #[test]
