@@ -65,15 +65,12 @@ def run(study):
         "detection | scenes | worst FLIP | scenes below 0.01 | of | performance | energy | worst energy | row buffers KiB", defaults(study, sets))
 
     table = []
-    for rule, reuse in [*((rule, "primary") for rule in RULES), ("", "")]:
-        flags = f"--rule {rule} --reuse {reuse}" if rule else ""
-        chip = study.csv("reproject", traces["crytek-sponza"], flags)[0]
-        dram = study.csv("reproject", traces["crytek-sponza"], IN_DRAM, flags or f"--rule {chip['rule']} --reuse {chip['reuse']}")[0]
-        cells = [f"{float(dram[key]) / unit:.{digits}f}" for key, digits, unit in FIGURES.values()]
-        table.append([f"`{rule}`" if rule else "default", *cells, f"{float(chip['detection_sram_kib']):.0f}", f"{float(chip['relative_energy']):.2f}"])
+    for rule in RULES:
+        row = study.csv("reproject", traces["crytek-sponza"], IN_DRAM, "--reuse primary --rule", rule)[0]
+        table.append([f"`{rule}`", *(f"{float(row[key]) / unit:.{digits}f}" for key, digits, unit in FIGURES.values())])
     study.write(
-        "reprojection-rules", f"tracegen rays crytek-sponza/sponza.gltf --size {size}, replay reproject [--preset sgrt-paper] --rule RULE --reuse primary --csv",
-        " | ".join(["rule", *FIGURES, "on chip: row buffers KiB", "energy"]), table)
+        "reprojection-rules", f"tracegen rays crytek-sponza/sponza.gltf --size {size}, replay reproject --preset sgrt-paper --reuse primary --rule RULE --csv",
+        " | ".join(["rule", *FIGURES]), table)
 
     small = [study.rays(scene, "--size 512x512", name=f"small/{scene}") for scene in SGRT_SCENES]
     readings = []
