@@ -4,12 +4,11 @@
 //! in which rays are traced. Otherwise, configured hit rates apply.
 
 use super::config::{HitRates, SgrtConfig};
-use super::order_rules::Recorded;
+use super::order_rules::Count;
 use super::work::{BatchWork, RayClass};
 use formats::raytrace::{BvhSummary, Visit};
 use sim::config::{BetweenFrames, RunConfig};
 use sim::memory::{AnyCache, Cache, Caches, Found, Hierarchy, MissPath, OtherWork};
-use sim::order::TileRef;
 
 /// Misses of a batch. Traffic depends on lines. Time depends on visits, because a visit requests all lines
 /// of its node or triangle at once and waits for the last one.
@@ -94,9 +93,10 @@ pub(super) struct DeviceCaches {
     caches: Hierarchy<Box<dyn Cache>>,
     units: usize,
     line_bytes: u64,
-    /// The tile and its pixel that [`Self::visit`] counts for.
-    pub at: (TileRef, usize),
-    recorded: Option<Recorded>,
+    /// The tile that [`Self::visit`] counts for.
+    pub tile: u32,
+    /// By tile, both eyes together; empty if they are not counted.
+    counted: Vec<Count>,
 }
 
 impl DeviceCaches {
@@ -119,25 +119,19 @@ impl DeviceCaches {
             caches: Hierarchy::new(caches, MissPath::memory_alone()),
             units,
             line_bytes: c.line_bytes,
-            at: (TileRef { pass: 0, tile: 0 }, 0),
-            recorded: None,
+            tile: 0,
+            counted: Vec::new(),
         }
     }
 
-    /// Records accesses from now on.
-    pub fn record(&mut self, into: Recorded) {
-        self.recorded = Some(into);
+    /// Counts lines by tile from now on.
+    pub fn count(&mut self, tiles: u32) {
+        self.counted = vec![Count::default(); tiles as usize];
     }
 
-    /// These caches, which record accesses.
-    pub fn recording(mut self, into: Recorded) -> Self {
-        self.record(into);
-        self
-    }
-
-    /// Ends recording.
-    pub fn take_recorded(&mut self) -> Option<Recorded> {
-        self.recorded.take()
+    /// Ends counting.
+    pub fn take_counted(&mut self) -> Vec<Count> {
+        std::mem::take(&mut self.counted)
     }
 
     /// Applies what happens to the caches before the frame with this index.
@@ -162,11 +156,12 @@ impl DeviceCaches {
         let cache = 2 * (unit % self.units) + usize::from(matches!(visit, Visit::Triangle(_)));
         let before = *misses;
         for line in first / self.line_bytes..=last / self.line_bytes {
-            if let Some(recorded) = &mut self.recorded {
-                let (at, pixel) = self.at;
-                recorded.add(at, pixel, line as u32);
+            let found = self.caches.access(cache, line as u32);
+            if let Some(count) = self.counted.get_mut(self.tile as usize) {
+                count.read += 1;
+                count.fetched += u64::from(matches!(found, Found::Below));
             }
-            match self.caches.access(cache, line as u32) {
+            match found {
                 Found::L1 => {}
                 Found::L2 => misses.l1_lines += 1.0,
                 Found::Below => {

@@ -273,7 +273,7 @@ pub(super) fn misses_of(
             for (batch, tiles) in batches.iter().zip(&tiles) {
                 for_rays(frame, plan, batch, tiles, |of| {
                     if kept(eye_of(of.at), of.sample, RayClass::of(of.ray)) {
-                        caches.at = (of.at, of.pixel);
+                        caches.tile = of.at.tile;
                         let misses = &mut found[of.at.pass as usize][of.at.tile as usize];
                         for &visit in of.visits {
                             caches.visit(of.unit, visit, &frame.tables.bvh, misses);
@@ -305,8 +305,6 @@ pub(super) fn misses_in_usual_order(
 /// A ray in its turn.
 pub(super) struct RayTurn<'a> {
     pub at: TileRef,
-    /// Its pixel in the tile.
-    pub pixel: usize,
     /// Its pixel in the eye's image.
     pub sample: usize,
     /// The unit that traces it, to be taken modulo the units.
@@ -343,7 +341,6 @@ pub(super) fn for_rays(
             let end = first.saturating_add(ray.visit_count() as usize);
             visit(RayTurn {
                 at: places[turn.tile],
-                pixel: turn.pixel,
                 sample,
                 unit: turn.unit,
                 ray,

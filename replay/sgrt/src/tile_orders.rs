@@ -4,13 +4,13 @@ use super::cache::{DeviceCaches, Misses};
 use super::config::SgrtConfig;
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{Kept, misses_of};
-use super::order_rules::{LastFrame, OrderRule, Recorded};
+use super::order_rules::{Choice, Count, Counted, OrderRule};
 use formats::raytrace::RaytraceTables;
 use serde::{Deserialize, Serialize};
 use sim::config::{BetweenFrames, Order};
 use sim::order::curve::Curve;
 use sim::order::parts::{Eyes, Parts};
-use sim::order::rays::RayPlan;
+use sim::order::rays::{RayPlan, tiles_of};
 use sim::order::{Counters, PlanInputs};
 use sim::registry::Row;
 use sim::stream::ray_counters;
@@ -82,8 +82,8 @@ pub struct TileOrders {
     pub frame: u32,
     /// The order of the reference, of the selected rule's run and of plain reuse.
     pub chosen: [String; 3],
-    /// Bytes that the choice for the next frame writes and reads, for the same runs. Not part of `dram`.
-    pub rule_bytes: [u64; 3],
+    /// The order that a rule tries on the sampled pairs of tiles, for the same runs; none if it tries none.
+    pub tried: [Option<String>; 3],
 }
 
 /// The tile order of a sequence of frames, and what the frames so far left behind.
@@ -101,8 +101,9 @@ pub struct TileSequence {
 /// One run through all frames.
 struct RunState {
     caches: DeviceCaches,
-    recorded: Option<Recorded>,
-    order: Order,
+    choice: Choice,
+    /// The frames so far, for a rule.
+    counted: Vec<Counted>,
     plan: RayPlan,
 }
 
@@ -114,6 +115,18 @@ fn usual_order() -> Order {
 /// The default plan: row by row, left and right tile in turn.
 pub(super) fn usual_plan(tables: &RaytraceTables) -> RayPlan {
     RayPlan::new(usual_order(), &PlanInputs::default(), tables, 0)
+}
+
+/// The part of each tile in [`Counted`].
+fn parts(tables: &RaytraceTables) -> Vec<usize> {
+    let mut parts = vec![0; tables.tile_count() as usize];
+    let curve = RayPlan::new(Order::Z2_STA, &PlanInputs::default(), tables, 0);
+    for (number, batch) in curve.batches().enumerate() {
+        for at in tiles_of(batch) {
+            parts[at.tile as usize] = Counted::part_of(number);
+        }
+    }
+    parts
 }
 
 impl TileSequence {
@@ -137,13 +150,13 @@ impl TileSequence {
             return None;
         }
         let of_run = |run: usize| &self.runs[run];
-        let bytes = |run| (of_run(run).recorded.as_ref()).map_or(0, Recorded::traffic_bytes);
+        let name = |order: Order| order.name().to_owned();
         Some(TileOrders {
             order: self.order.map(|order| order.to_string()),
             between_frames: self.between.map(|between| between.to_string()),
             frame: self.frame,
-            chosen: [0, 1, 2].map(|run| of_run(run).order.name().to_owned()),
-            rule_bytes: [0, 1, 2].map(bytes),
+            chosen: [0, 1, 2].map(|run| name(of_run(run).choice.order)),
+            tried: [0, 1, 2].map(|run| of_run(run).choice.sampled.map(|(_, order)| name(order))),
         })
     }
 
@@ -156,7 +169,7 @@ impl TileSequence {
         self.frame += 1;
     }
 
-    /// Plans the frame for each run. `source` is read for an order that needs counters, and for a rule's first frame.
+    /// Plans the frame for each run. `source` is read for an order that needs counters.
     ///
     /// # Errors
     /// [`FrameError`] for a trace without visits, for another grid than the last frame's, and for an unreadable tile.
@@ -182,8 +195,8 @@ impl TileSequence {
         self.tiles = Some(tables.tiles());
         let empty = |(_, config): &(&Kept<'_>, &SgrtConfig)| RunState {
             caches: DeviceCaches::new(config),
-            recorded: None,
-            order: usual_order(),
+            choice: Choice::whole(usual_order()),
+            counted: Vec::new(),
             plan: RayPlan::default(),
         };
         if self.runs.is_empty() {
@@ -212,45 +225,32 @@ impl TileSequence {
             })?;
             self.counters = Some(own);
         }
-        for (run, choice) in self.runs.iter_mut().zip(runs) {
-            let config = choice.1;
+        for (run, (_, config)) in self.runs.iter_mut().zip(runs) {
             let last = before.as_ref().or(self.counters.as_ref());
             let inputs = PlanInputs {
                 last,
                 ..inputs(config)
             };
             let plan = |order: Order| RayPlan::new(order, &inputs, tables, self.frame);
-            run.order = match self.order {
-                None => usual_order(),
-                Some(RayOrder::Fixed(order)) => order,
+            run.choice = match self.order {
+                None => Choice::whole(usual_order()),
+                Some(RayOrder::Fixed(order)) => Choice::whole(order),
                 Some(RayOrder::Rule(rule)) => {
-                    let rule = rule.row();
-                    let nothing = || Recorded::new((rule.stride)(config), tables);
-                    let mut recorded = run.recorded.take();
-                    if recorded.is_none() {
-                        let mut caches = DeviceCaches::new(config).recording(nothing());
-                        let usual = usual_plan(tables);
-                        misses_of(source, frame, &usual, &[*choice], &mut [&mut caches])?;
-                        recorded = caches.take_recorded();
-                    }
-                    let last = LastFrame {
-                        recorded: &recorded.unwrap_or_default(),
-                        tables,
-                        config,
-                        keeps_lines: self.between.is_some_and(|of| of == BetweenFrames::Keep),
-                        plan: &plan,
-                    };
-                    let chosen = (rule.choose)(&last);
-                    run.caches.record(nothing());
-                    chosen
+                    run.caches.count(tables.tile_count());
+                    (rule.row().choose)(&run.counted, config)
                 }
             };
-            run.plan = plan(run.order);
+            run.plan = plan(run.choice.order);
+            if let Some((sample, tried)) = run.choice.sampled {
+                let parts = parts(tables);
+                let is_sampled = |tile: u32| parts[tile as usize] == sample;
+                run.plan = run.plan.with_tiles_of(&plan(tried), is_sampled);
+            }
         }
         Ok(())
     }
 
-    /// The misses of each run, by eye and tile. Runs of one order read the trace once.
+    /// The misses of each run, by eye and tile. Runs of one plan read the trace once.
     ///
     /// # Errors
     /// As [`Self::begin`].
@@ -263,29 +263,65 @@ impl TileSequence {
         self.begin(source, frame, runs)?;
         let mut found = vec![Default::default(); runs.len()];
         for first in 0..self.runs.len() {
-            let order = self.runs[first].order;
-            if self.runs[..first].iter().any(|run| run.order == order) {
+            let plan = self.runs[first].plan.clone();
+            if self.runs[..first].iter().any(|run| run.plan == plan) {
                 continue;
             }
-            let plan = self.runs[first].plan.clone();
             let mut choices = Vec::new();
             let mut caches = Vec::new();
             let mut places = Vec::new();
             for (place, run) in self.runs.iter_mut().enumerate() {
-                if run.order == order {
+                if run.plan == plan {
                     choices.push(runs[place]);
                     caches.push(&mut run.caches);
                     places.push(place);
                 }
             }
-            let of_order = misses_of(source, frame, &plan, &choices, &mut caches)?;
-            for (place, misses) in places.into_iter().zip(of_order) {
+            let of_plan = misses_of(source, frame, &plan, &choices, &mut caches)?;
+            for (place, misses) in places.into_iter().zip(of_plan) {
                 found[place] = misses;
             }
         }
-        for run in &mut self.runs {
-            run.recorded = run.caches.take_recorded();
+        if let Some(RayOrder::Rule(_)) = self.order {
+            let part_of = parts(&frame.tables);
+            for run in &mut self.runs {
+                let mut parts = [Count::default(); Counted::SAMPLES + 1];
+                for (count, part) in run.caches.take_counted().iter().zip(&part_of) {
+                    parts[*part].add(count);
+                }
+                let choice = run.choice;
+                run.counted.push(Counted { choice, parts });
+            }
         }
         Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{View, frame};
+    use sim::order::WorkItem;
+
+    #[test]
+    fn sampled_pairs_have_their_own_order_and_every_tile_comes_once() {
+        let tables = frame(&[], View::default()).tables;
+        let parts = parts(&tables);
+        let size = |part| parts.iter().filter(|of| **of == part).count();
+        assert_eq!([0, 1, 2].map(size), [4, 4, 7]);
+        let plan = |order| RayPlan::new(order, &PlanInputs::default(), &tables, 0);
+        let choices = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
+        for (order, tried) in choices.into_iter().flat_map(|a| choices.map(|b| (a, b))) {
+            let mixed = plan(order).with_tiles_of(&plan(tried), |tile| parts[tile as usize] == 1);
+            let mut tiles: Vec<_> = mixed.batches().flat_map(tiles_of).collect();
+            tiles.sort_unstable_by_key(|at| (at.pass, at.tile));
+            let all = (0..2).flat_map(|pass| (0..15).map(move |tile| (pass, tile)));
+            assert!(all.eq(tiles.iter().map(|at| (at.pass, at.tile))));
+            for item in mixed.batches().flatten() {
+                let of_pair = parts[item.tiles().next().unwrap().tile as usize] == 1;
+                let expected = if of_pair { tried } else { order } == Order::Z2_STA;
+                assert_eq!(matches!(item, WorkItem::Pair(..)), expected);
+            }
+        }
     }
 }

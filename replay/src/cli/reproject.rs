@@ -43,7 +43,7 @@ use std::process::ExitCode;
   replay reproject teapot.raytrace --timing cycle
   replay reproject teapot.raytrace --timing cycle --prefetch ttp
   replay reproject chess.raytrace --order z2-sta+offset
-  replay reproject f0.raytrace f1.raytrace f2.raytrace --order sampled --between keep
+  replay reproject f0.raytrace f1.raytrace f2.raytrace --order trials --between keep
   replay reproject *.raytrace --html out/reprojection.html
   replay reproject chess.raytrace --curve --sensitivity --html chess.html"
 )]

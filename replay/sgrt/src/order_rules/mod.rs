@@ -1,13 +1,10 @@
-//! Rules that choose the tile order of the next frame from what the last one recorded. One a file, each a row of the
+//! Rules that choose the tile order of the next frame from counters of the frames before. One a file, each a row of the
 //! table.
 
-mod sampled;
+mod trials;
 
 use super::config::SgrtConfig;
-use formats::raytrace::RaytraceTables;
 use sim::config::Order;
-use sim::order::TileRef;
-use sim::order::rays::RayPlan;
 use sim::registry::Named;
 
 /// A row of the table of rules.
@@ -17,74 +14,78 @@ pub struct RuleRow {
     pub name: &'static str,
     /// One line of help.
     pub help: &'static str,
-    /// The L2's sets per set that is recorded.
-    pub stride: fn(&SgrtConfig) -> u32,
-    /// The order for the next frame.
-    pub choose: fn(&LastFrame<'_>) -> Order,
+    /// The orders of the next frame, given the frames before and the machine.
+    pub choose: fn(&[Counted], &SgrtConfig) -> Choice,
 }
 
 /// A rule.
 pub type OrderRule = Named<RuleRow>;
 
-sim::rows! { RuleRow: OrderRule::new(&sampled::ROW); }
+sim::rows! { RuleRow: OrderRule::new(&trials::ROW); }
 
-/// The last frame, and the machine.
-pub struct LastFrame<'a> {
-    /// The lines that it recorded.
-    pub recorded: &'a Recorded,
-    /// The tile grids.
-    pub tables: &'a RaytraceTables,
-    /// The machine.
-    pub config: &'a SgrtConfig,
-    /// True if caches keep lines between frames.
-    pub keeps_lines: bool,
-    /// The items of an order.
-    pub plan: &'a dyn Fn(Order) -> RayPlan,
+/// The orders of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// Of all pairs of tiles, except those of a sample.
+    pub order: Order,
+    /// A sample whose pairs have another order, and that order. It must trace a pair's tiles together.
+    pub sampled: Option<(usize, Order)>,
 }
 
-/// Accesses to recorded sets of the L2, by tile. They pass a filter of the tile's last lines instead of an L1, so that
-/// they do not depend on the order of tiles.
-#[derive(Clone, Debug, Default)]
-pub struct Recorded {
-    stride: u32,
-    /// Pixel and line.
-    tiles: [Vec<Vec<(u16, u32)>>; 2],
-}
-
-impl Recorded {
-    /// Bytes of an access: two of the line's number, which tell the lines of a set apart, and the pixel.
-    const ENTRY_BYTES: u64 = 3;
-    /// Lines of the filter.
-    const FILTER: usize = 32;
-
-    /// Nothing recorded yet of the tiles of a trace.
-    pub fn new(stride: u32, tables: &RaytraceTables) -> Self {
-        let tiles = vec![Vec::new(); tables.tile_count() as usize];
+impl Choice {
+    /// One order for all pairs.
+    pub fn whole(order: Order) -> Self {
         Self {
-            stride: stride.max(1),
-            tiles: [tiles.clone(), tiles],
+            order,
+            sampled: None,
         }
     }
+}
 
-    /// Adds an access of a pixel of a tile.
-    pub fn add(&mut self, at: TileRef, pixel: usize, line: u32) {
-        if line.is_multiple_of(self.stride) {
-            let list = &mut self.tiles[at.pass as usize][at.tile as usize];
-            let mut last = list.iter().rev().take(Self::FILTER);
-            if last.all(|(_, known)| *known != line) {
-                list.push((pixel as u16, line));
-            }
-        }
+/// Lines of the hierarchy that are read in a part of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// All of them, which no order changes.
+    pub read: u64,
+    /// Those that the L2 fetches.
+    pub fetched: u64,
+}
+
+impl Count {
+    /// Adds another part.
+    pub fn add(&mut self, other: &Self) {
+        sim::add_fields!(self, other, read, fetched);
     }
 
-    /// Pixels and lines of a tile, in order of pixels.
-    pub fn of(&self, at: TileRef) -> &[(u16, u32)] {
-        &self.tiles[at.pass as usize][at.tile as usize]
+    /// The fetched lines per line read, relative to those of another frame's part. Parts without lines are equal.
+    pub fn over(&self, other: &Self) -> f64 {
+        let rate = |of: &Self| of.fetched.max(1) as f64 / of.read.max(1) as f64;
+        rate(self) / rate(other)
+    }
+}
+
+/// A frame, its orders and its counters.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted {
+    /// Its orders.
+    pub choice: Choice,
+    /// The samples, and then the other pairs.
+    pub parts: [Count; Self::SAMPLES + 1],
+}
+
+impl Counted {
+    /// Samples of pairs of tiles.
+    pub const SAMPLES: usize = 2;
+    /// The share of each in all pairs.
+    pub const SAMPLE_SHARE: f64 = 0.25;
+
+    /// The part of the pair with a number on the Morton curve. Neighbours are sampled together.
+    pub fn part_of(number: usize) -> usize {
+        [0, 0, 2, 2, 1, 1, 2, 2][number % 8]
     }
 
-    /// Bytes that recording writes and choosing reads.
-    pub fn traffic_bytes(&self) -> u64 {
-        let lines: usize = self.tiles.iter().flatten().map(Vec::len).sum();
-        2 * Self::ENTRY_BYTES * lines as u64
+    /// Fetched lines of the whole frame.
+    pub fn fetched(&self) -> u64 {
+        self.parts.iter().map(|part| part.fetched).sum()
     }
 }

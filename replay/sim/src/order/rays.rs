@@ -5,6 +5,7 @@ use formats::Broken;
 use formats::raytrace::RaytraceTables;
 use formats::textrace::{Pass, PassKind};
 use formats::view::Eye;
+use std::collections::BTreeMap;
 
 /// The passes that stand for the eyes of a ray trace.
 pub fn ray_passes(tables: &RaytraceTables, frame: u32) -> [Pass; 2] {
@@ -56,6 +57,29 @@ impl RayPlan {
                 1
             },
             has_own_units,
+        }
+    }
+
+    /// This plan, in which `other` takes the place of the items of some tiles. Neither has an assignment, and both pair
+    /// equal tile numbers.
+    #[must_use]
+    pub fn with_tiles_of(&self, other: &Self, has: impl Fn(u32) -> bool) -> Self {
+        let tile_of = |item: &WorkItem| item.tiles().next().map_or(0, |at| at.tile);
+        let mut theirs: BTreeMap<u32, Vec<WorkItem>> = BTreeMap::new();
+        for item in other.items.iter().filter(|item| has(tile_of(item))) {
+            theirs.entry(tile_of(item)).or_default().push(*item);
+        }
+        let replaced = |item: &WorkItem| {
+            let tile = tile_of(item);
+            if has(tile) {
+                theirs.remove(&tile).unwrap_or_default()
+            } else {
+                vec![*item]
+            }
+        };
+        Self {
+            items: self.items.iter().flat_map(replaced).collect(),
+            ..*self
         }
     }
 
