@@ -5,13 +5,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 from .common import mean, saved
 
-OPTIONS = {
-    "--size": dict(default="96x96", help="pixels per eye (96x96)"),
-    "--frames": dict(type=int, default=30, help="consecutive frames of each path, 72 per second (30)"),
-}
 # The rule's parameters were chosen on the first group.
 GROUPS = {"built in": ["chess", "car", "lab", "music-box"], "others": ["crytek-sponza", "stk-cocoa-temple", "stk-black-forest", "bmw_55k"]}
 SCENES = [scene for group in GROUPS.values() for scene in group]
+OPTIONS = {
+    "--size": dict(default="96x96", help="pixels per eye (96x96)"),
+    "--frames": dict(type=int, default=30, help="consecutive frames of each path, 72 per second (30)"),
+    "--only": dict(default=",".join(SCENES), help="scenes, with commas between them (all)"),
+}
 KINDS = {"primary": "primary", "shadow": "shadow", "mirror and glass": "reflection,refraction", "diffuse": "diffuse"}
 # L2 sizes; the L1 caches of each unit have 4 KiB each.
 L2_KIB = [16, 64, 256]
@@ -76,11 +77,12 @@ def measure(study, traces, kind, kib):
 
 
 def run(study):
-    for scene in SCENES:
+    scenes = study.options.only.split(",")
+    for scene in scenes:
         study.scene(scene)
     size, frames = study.options.size, study.options.frames
-    table, by_scene, found = [], [], {}
-    for scene in SCENES:
+    table, found = [], {}
+    for scene in scenes:
         captured = lambda frame: study.rays(scene, f"--size {size} --visits --bounces 1 --path head --frame {frame}", name=f"{scene}-{frame}")
         traces = [captured(frame) for frame in range(frames)]
         pairs = pair_kib(study, traces[0], KINDS)
@@ -92,7 +94,7 @@ def run(study):
             for way, row in (ways or {}).items():
                 found[kind, kib, way, scene] = row
                 table.append([scene, kind, f"{pairs[kind]:.1f}", kib, way, *row.cells()])
-    detail = (f"tracegen rays SCENE --size {size} --visits --bounces 1 --path head --frame K, {frames} frames from 0, replay reproject --rule none "
+    detail = (f"{', '.join(scenes)}: tracegen rays SCENE --size {size} --visits --bounces 1 --path head --frame K, {frames} frames from 0, replay reproject --rule none "
               "--reuse pixel --between keep --rays KIND --order ORDER")
     figures = ("Morton MB per frame | LRTA saves % | STA saves % | rule saves % | oracle saves % | rule over the best fixed order % | "
                "Morton kcycles | LRTA kcycles | STA kcycles | rule kcycles")
@@ -114,10 +116,12 @@ def run(study):
         "ray-orders-summary", detail, "rays | L2 KiB | eyes | scenes | LRTA saves % | STA saves % | rule saves % | oracle saves % | of the oracle's bytes, rule % | "
         "rule over the best fixed order, worst scene %", summary)
     groups = []
-    for group, scenes in GROUPS.items():
+    for group, of_group in GROUPS.items():
         for way in WAYS:
-            for kib in L2_KIB:
-                rows = [row for (_, l2, w, scene), row in found.items() if w == way and l2 == kib and scene in scenes]
+            for kib in [*L2_KIB, "all"]:
+                rows = [row for (_, l2, w, scene), row in found.items() if w == way and kib in (l2, "all") and scene in of_group]
+                if not rows:
+                    continue
                 over = [row.over for row in rows]
                 groups.append([group, way, kib, len(rows), share(rows, lambda row: row.sums[RULE]), share(rows, lambda row: row.oracle), f"{kept(rows):.1f}",
                                f"{mean(over):.2f}", f"{max(over):.2f}", sum(value > 1 for value in over)])
