@@ -4,6 +4,7 @@
 use super::{Choice, Counted, RuleRow};
 use crate::config::SgrtConfig;
 use sim::config::Order;
+use std::ops::Range;
 
 /// Orders in which they are tried. The first wins if several fetch equally.
 const CHOICES: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
@@ -78,7 +79,7 @@ fn trial(frames: &[Counted], l2_lines: u64) -> Result<Settled, Choice> {
             let Some(at) = frames.iter().position(|of| of.choice == trial) else {
                 return Err(trial);
             };
-            let (ratio, has_after) = ratio(frames, at, sample);
+            let (ratio, has_after) = ratio(frames, at, sample..sample + 1);
             sum += ratio;
             cost += (ratio - 1.0).max(0.0) * Counted::SAMPLE_SHARE;
             let largest = if has_after { LARGEST_RISK } else { 1.0 };
@@ -92,7 +93,7 @@ fn trial(frames: &[Counted], l2_lines: u64) -> Result<Settled, Choice> {
         let Some(at) = frames.iter().position(|of| of.choice.order == order) else {
             return Err(Choice::whole(order));
         };
-        let (ratio, has_after) = ratio(frames, at, Counted::SAMPLES);
+        let (ratio, has_after) = ratio(frames, at, 0..Counted::SAMPLES + 1);
         if (ratio - 1.0).abs() < CLEAR && !has_after {
             return Err(Choice::whole(current));
         }
@@ -104,18 +105,32 @@ fn trial(frames: &[Counted], l2_lines: u64) -> Result<Settled, Choice> {
     Ok(Settled { order: best, cost })
 }
 
-/// The lines of a part of the frame `at` relative to those of the last frame before without a trial in that part, or to
-/// the mean with the first one after, if there is one (then true). Frames differ by themselves, most of all in few pairs.
-fn ratio(frames: &[Counted], at: usize, part: usize) -> (f64, bool) {
+/// The lines of some parts of the frame `at` relative to those of the last frames before without a trial in them, or to the
+/// mean with the first ones after, if there are any (then true). Frames differ by themselves, most of all in few pairs.
+fn ratio(frames: &[Counted], at: usize, parts: Range<usize>) -> (f64, bool) {
     let current = frames[0].choice.order;
-    let is_plain = |of: &&Counted| {
+    let is_plain = |of: &Counted, part: usize| {
         let sample = of.choice.sampled.map(|(sample, _)| sample);
         of.choice.order == current && sample != Some(part)
     };
-    let over = |other: &Counted| frames[at].parts[part].over(&other.parts[part]);
-    let before = over(frames[..at].iter().rfind(is_plain).unwrap_or(&frames[0]));
-    match frames[at..].iter().find(is_plain) {
-        Some(after) => (2.0 / (1.0 / before + 1.0 / over(after)), true),
+    let sum = |frame_of: &dyn Fn(usize) -> Option<usize>| {
+        let mut sum = Count::default();
+        for part in parts.clone() {
+            sum.add(&frames[frame_of(part)?].parts[part]);
+        }
+        Some(sum)
+    };
+    let own = sum(&|_| Some(at)).unwrap_or_default();
+    let earlier = |part| {
+        frames[..at]
+            .iter()
+            .rposition(|of| is_plain(of, part))
+            .or(Some(0))
+    };
+    let later = |part| (at..frames.len()).find(|number| is_plain(&frames[*number], part));
+    let before = own.over(&sum(&earlier).unwrap_or_default());
+    match sum(&later) {
+        Some(after) => (2.0 / (1.0 / before + 1.0 / own.over(&after)), true),
         None => (before, false),
     }
 }
