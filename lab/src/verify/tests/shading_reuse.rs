@@ -13,9 +13,16 @@ fn reuse(contrast: f32) -> Planner {
     planner(&settings, SIZE_PX, BOTH)
 }
 
+/// The corridor with light, so that its pictures have colours.
+fn lit() -> Scene {
+    let mut scene = corridor();
+    scene.sky = Vec3::ONE;
+    scene
+}
+
 #[test]
 fn reuse_is_captured_as_it_is_drawn_and_shades_less() {
-    let scene = corridor();
+    let scene = lit();
     let planner = reuse(1.0);
     let captured = capture_as(&planner, &scene, 0, BUDGET, true).unwrap();
     assert!(captured.pictures_match);
@@ -41,7 +48,7 @@ fn left_at(left: &RenderedFrame, at: DVec2, distance: impl Fn(f64) -> f64) -> Op
         let weight = |d: i64, t: f64| if d == 1 { t } else { 1.0 - t };
         let t = at - 0.5 - low;
         let weight = weight(dx, t.x) * weight(dy, t.y);
-        if weight < 0.02 {
+        if weight < 1.0 / 256.0 {
             continue;
         }
         let [x, y] = [low.x as i64 + dx, low.y as i64 + dy];
@@ -72,7 +79,7 @@ fn left_at(left: &RenderedFrame, at: DVec2, distance: impl Fn(f64) -> f64) -> Op
 /// it and in which colour.
 #[test]
 fn what_is_reused_is_what_the_left_eye_shows_and_all_else_is_exact() {
-    let scene = without_blended(corridor());
+    let scene = without_blended(lit());
     let draws = DrawList::new(&scene, 0).unwrap();
     let mut backend = driver(&scene, &draws, SIZE_PX);
     let views = views(&scene, SIZE_PX);
@@ -151,7 +158,7 @@ fn without_blended(mut scene: Scene) -> Scene {
 
 #[test]
 fn pixels_of_much_contrast_are_shaded() {
-    let scene = corridor();
+    let scene = lit();
     let fragments = |contrast| {
         let captured = capture_as(&reuse(contrast), &scene, 0, BUDGET, false).unwrap();
         captured.counts.fragments

@@ -1,7 +1,7 @@
 //! Tries other orders, at first on few pairs of tiles, and keeps the order that fetches least. The next trials wait until
 //! the lines that the last ones cost are few beside those of the frames between.
 
-use super::{Choice, Counted, RuleRow};
+use super::{Choice, Count, Counted, RuleRow};
 use crate::config::SgrtConfig;
 use sim::config::Order;
 use std::ops::Range;
@@ -137,7 +137,6 @@ fn ratio(frames: &[Counted], at: usize, parts: Range<usize>) -> (f64, bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Count;
     use super::*;
 
     const FRAMES: usize = 400;
