@@ -16,11 +16,12 @@ const SHADOW_MAPS: &str = "shadow cascades";
 const MOST_CASCADES: u32 = 4;
 
 /// Flags of `tracegen raster` that leave out fragments which a plain picture has.
-const LEAVE_OUT: [&str; 4] = [
+const LEAVE_OUT: [&str; 5] = [
     "--hidden-area-mask",
     "--hidden-area-mesh",
     "--cull-distance",
     "--cull-px",
+    "--reuse-shading",
 ];
 
 /// Takes display and views from a trace. Returns whether the shadow cascades follow from them.
