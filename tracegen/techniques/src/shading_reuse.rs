@@ -49,7 +49,7 @@ pub struct Reuse {
     /// Index of the other eye's layer in the plan.
     pub from: usize,
     /// Clip space of this layer to that of the other one.
-    pub from_clip: Mat4,
+    pub other_from_clip: Mat4,
     /// Depth of the nearest surfaces that are looked for. Nearer ones are drawn.
     pub nearest: f32,
     /// Depth is `b / w - a` at distance w: (a, b) of this layer and of the other one.
@@ -69,12 +69,12 @@ impl Reuse {
                 .map(|m| Mat4::from_cols_array_2d(m).as_dmat4());
             eye_to_clip * world_to_eye
         };
-        let from_clip: DMat4 = clip_from_world(other) * clip_from_world(view).inverse();
+        let other_from_clip: DMat4 = clip_from_world(other) * clip_from_world(view).inverse();
         let depth_of = [view, other].map(|view| [view.eye_to_clip[2][2], view.eye_to_clip[3][2]]);
         let [a, b] = depth_of[0];
         Self {
             from,
-            from_clip: from_clip.as_mat4(),
+            other_from_clip: other_from_clip.as_mat4(),
             nearest: (b / NEAREST_M - a).clamp(0.0, 1.0),
             depth_of,
             contrast: settings.contrast,

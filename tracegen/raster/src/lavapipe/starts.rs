@@ -44,6 +44,17 @@ struct StartData {
     ends: [f32; 4],
 }
 
+/// The shader's `Reuse`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct ReuseData {
+    other_from_clip: [[f32; 4]; 4],
+    depth_of: [[f32; 2]; 2],
+    nearest: f32,
+    contrast: f32,
+    padding: [f32; 2],
+}
+
 const DEPTH: wgpu::TextureSampleType = wgpu::TextureSampleType::Depth;
 const COLOR: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
@@ -54,7 +65,11 @@ impl Starts {
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader of initial contents", || {
-            let module = gpu.module("starts", include_str!("../shaders/starts.wgsl"));
+            let source = concat!(
+                include_str!("../shaders/starts.wgsl"),
+                include_str!("../shaders/reuse.wgsl")
+            );
+            let module = gpu.module("starts", source);
             let make = |entry_point, textures: &[(u32, wgpu::TextureSampleType)]| {
                 Pipeline::new(gpu, &module, entry_point, textures)
             };
@@ -120,13 +135,13 @@ impl Starts {
 
     /// Surfaces that another eye's layer, given with its target, has shaded.
     pub fn reused(&self, gpu: &Gpu, reuse: &Reuse, from: &LayerTarget) -> Drawn<'_> {
-        let [own, other] = reuse.depth_of;
-        let mut data = StartData {
-            from_farther_clip: reuse.from_clip.to_cols_array_2d(),
-            ends: [reuse.nearest, 0.0, 0.0, reuse.contrast],
-            ..bytemuck::Zeroable::zeroed()
+        let data = ReuseData {
+            other_from_clip: reuse.other_from_clip.to_cols_array_2d(),
+            depth_of: reuse.depth_of,
+            nearest: reuse.nearest,
+            contrast: reuse.contrast,
+            padding: [0.0; 2],
         };
-        data.maps[0][0] = [own[0], own[1], other[0], other[1]];
         let textures = [&from.depth_view, &from.color.view];
         self.reused.drawn(gpu, &data, &textures, true)
     }
@@ -162,7 +177,7 @@ impl Pipeline {
     fn drawn(
         &self,
         gpu: &Gpu,
-        data: &StartData,
+        data: &impl bytemuck::Pod,
         textures: &[&wgpu::TextureView],
         over_sky: bool,
     ) -> Drawn<'_> {

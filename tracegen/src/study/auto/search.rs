@@ -466,7 +466,12 @@ impl<J: Judge> Search<'_, J> {
     /// `row` with more parts, which replace the parts that they exclude; none if nothing changes or it cannot
     /// be rendered.
     fn with(&self, row: &Row, parts: &[Part]) -> Option<Row> {
-        let replaced = |part: &&Part| parts.iter().any(|new| new.setting() == part.setting());
+        // Parts of one setting cannot be joined, and other pairs cannot be rendered.
+        let goes_with = |part: &Part, new: &Part| {
+            let pair = Row::of(vec![part.clone(), new.clone()]);
+            pair.is_ok_and(|pair| self.judge.can(&pair))
+        };
+        let replaced = |part: &&Part| !parts.iter().all(|new| goes_with(part, new));
         let kept = row.parts.iter().filter(|part| !replaced(part));
         // The baseline is the combination without parts.
         let baseline = Row::baseline().parts;
