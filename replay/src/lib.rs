@@ -12,5 +12,5 @@ pub use sim::{
     addresses, config, engine, line_list, memory, model_version, order, paper, preset, registry,
     result, size, stream,
 };
-pub use studies::{accuracy, compare, experiment, locality, orders_study, techniques};
-pub use {report, sgrt};
+pub use studies::{accuracy, compare, experiment, orders_study, techniques};
+pub use {locality, report, sgrt};

@@ -30,7 +30,7 @@ const CRATES: [(&str, &[&[&str]]); 2] = [
     (
         "studies",
         &[
-            &["compare", "locality"],
+            &["compare"],
             &["experiment"],
             &["accuracy", "orders_study", "sampling", "techniques"],
         ],
@@ -123,7 +123,7 @@ fn a_use_of_a_higher_layer_is_found() {
     assert!(fault(sim, "memory", "engine").is_some());
     assert!(fault(sim, "engine", "nowhere").is_some());
     assert_eq!(fault(sim, "memory", "config"), None);
-    assert!(fault(studies, "locality", "accuracy").is_some());
+    assert!(fault(studies, "compare", "accuracy").is_some());
 }
 
 /// Property tests read `proptest-regressions/ROOM/FILE.txt` for `src/ROOM/FILE.rs`.

@@ -51,7 +51,9 @@ fn models_depend_neither_on_studies_nor_on_reports() {
         "sgrt",
         &["shell", "studies", "report", "plotters", "parquet"],
     );
-    assert_free_of("frame", &["shell", "sgrt", "studies", "report", "anyhow"]);
+    for model in ["frame", "locality"] {
+        assert_free_of(model, &["shell", "sgrt", "studies", "report", "anyhow"]);
+    }
     assert_free_of(
         "studies",
         &["report", "replay", "plotters", "parquet", "maud"],

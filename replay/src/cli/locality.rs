@@ -8,6 +8,7 @@ use super::subjects::Traces;
 use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
 use clap::Arg;
+use locality::{OrderFigures, Stream, Streams, analyse, analyse_addresses};
 use report::locality::{LocalityReport, TraceFigures};
 use shell::Progress;
 use sim::config::{Order, RunConfig};
@@ -15,7 +16,6 @@ use sim::stream::TileSource;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use studies::experiment::frame_count;
-use studies::locality::{OrderFigures, Stream, Streams, analyse, analyse_addresses};
 
 /// Default of `--orders`.
 const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";

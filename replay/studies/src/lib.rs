@@ -1,9 +1,8 @@
-//! Studies of many replays: sweeps, orders, locality, accuracy, stereo rendering techniques.
+//! Studies of many replays: sweeps, orders, accuracy, stereo rendering techniques.
 
 pub mod accuracy;
 pub mod compare;
 pub mod experiment;
-pub mod locality;
 pub mod orders_study;
 pub mod sampling;
 pub mod techniques;

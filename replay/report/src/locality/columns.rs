@@ -1,10 +1,8 @@
 //! Row types of the tables, and their columns.
 
 use crate::columns::{Column, Columns, Show};
+use locality::{ByOrigin, CacheHits, Figures, MissSplit, Origin, Sequence, Stream, WorkingSet};
 use sim::config::LevelConfig;
-use studies::locality::{
-    ByOrigin, CacheHits, Figures, MissSplit, Origin, Sequence, Stream, WorkingSet,
-};
 
 /// The stream that a row describes.
 #[derive(Clone, Copy, Debug)]

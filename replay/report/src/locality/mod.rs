@@ -8,10 +8,10 @@ use super::answers;
 use super::document::Document;
 use super::table::{Style, Table};
 use columns::{CurvePoint, Reuses, Subject, Summary, Window};
+use locality::{Figures, OrderFigures, Stream};
 use serde::Serialize;
 use sim::config::{LevelConfig, Mode, RunConfig};
 use sim::result::TraceId;
-use studies::locality::{Figures, OrderFigures, Stream};
 
 /// A trace's figures.
 pub struct TraceFigures {

@@ -8,9 +8,9 @@ use crate::html::{self, Answer, Page, figures};
 use crate::plots::PlotError;
 use crate::plots::stacked::StackedChart;
 use crate::table::Table;
+use locality::Stream;
 use maud::{Markup, html};
 use sim::size::format_bytes;
-use studies::locality::Stream;
 
 /// Keys of the columns in the page's table; CSV and JSON have all columns. Earlier frames are left out for
 /// traces of one frame.

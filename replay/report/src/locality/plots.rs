@@ -7,7 +7,7 @@ use crate::plots::bars::{BarChart, BarGroup};
 use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries};
 use crate::plots::stacked::StackedChart;
 use crate::theme;
-use studies::locality::{CacheHits, Origin, Sequence};
+use locality::{CacheHits, Origin, Sequence};
 
 fn style(summary: &Summary) -> SeriesStyle {
     SeriesStyle {

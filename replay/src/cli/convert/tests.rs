@@ -3,6 +3,7 @@ use crate::cli::testing::{file_of, lines};
 use clap::Parser;
 use formats::FormatError;
 use formats::interop::plain::{AddressFile, AddressForm, Block};
+use locality::{Streams, analyse};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use sim::config::{LevelConfig, Levels, Mode, Order};
@@ -14,7 +15,6 @@ use sim::stream::MemoryTrace;
 use sim::stream::testing::Synthetic;
 use sim::stream::testing::different_frames;
 use std::collections::HashSet;
-use studies::locality::{Streams, analyse};
 use studies::orders_study::default_orders;
 
 #[derive(Parser)]

@@ -12,7 +12,7 @@
 
 use super::Items;
 use super::stream::l2_stream;
-use crate::locality::{OptMisses, opt_misses};
+use locality::{OptMisses, opt_misses};
 use sim::config::{Order, RunConfig};
 use sim::engine::ReplayError;
 use sim::stream::{Expander, LineMemory, TileSource, Walk, rendered};

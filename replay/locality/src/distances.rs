@@ -1,8 +1,8 @@
 //! Counts of reuse distances: the distinct other lines used between two uses of a line (LRU stack distance,
 //! Mattson et al. 1970). A fully associative LRU cache of `n` lines hits at distances below `n`.
 
-use super::place::{ByOrigin, Origin, add};
-use super::set_associative::CacheHits;
+use crate::place::{ByOrigin, Origin, add};
+use crate::set_associative::CacheHits;
 
 /// Reuses by distance and by location of the previous use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub struct DistanceBin {
 
 impl Distances {
     #[inline(always)]
-    pub(super) fn count(&mut self, distance: u32, origin: usize, times: u64) {
+    pub(crate) fn count(&mut self, distance: u32, origin: usize, times: u64) {
         let distance = distance as usize;
         if distance >= self.0.len() {
             self.0.resize(distance + 1, ByOrigin::default());
@@ -30,7 +30,7 @@ impl Distances {
     }
 
     /// Adds the counts of another stream.
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         if self.0.len() < other.0.len() {
             self.0.resize(other.0.len(), ByOrigin::default());
         }
@@ -40,7 +40,7 @@ impl Distances {
     }
 
     /// All reuses.
-    pub(super) fn total(&self) -> ByOrigin {
+    pub(crate) fn total(&self) -> ByOrigin {
         self.below(self.0.len())
     }
 
@@ -58,7 +58,7 @@ impl Distances {
     }
 
     /// Reuses of one class, by distance.
-    pub(super) fn of(&self, origin: Origin) -> impl Iterator<Item = u64> + Clone {
+    pub(crate) fn of(&self, origin: Origin) -> impl Iterator<Item = u64> + Clone {
         self.0.iter().map(move |reuses| reuses[origin.index()])
     }
 

@@ -1,8 +1,8 @@
 //! Analyses plain addresses in their own order.
 
-use super::orders::{OrderFigures, Sequence, Stream};
-use super::place::Place;
-use super::profile::{Profile, StreamCache, check_size};
+use crate::orders::{OrderFigures, Sequence, Stream};
+use crate::place::Place;
+use crate::profile::{Profile, StreamCache, check_size};
 use formats::interop::plain::AddressFile;
 use sim::addresses::{AddressError, KindSet, for_line_blocks};
 use sim::config::{ConfigError, LevelConfig, RunConfig};

@@ -4,14 +4,14 @@
 /// A hierarchical bit set of times: one bit per time, one bit per non-empty word, and so on. Finding the
 /// last member before a time reads few words.
 #[derive(Clone, Debug)]
-pub(super) struct TimeSet {
+pub(crate) struct TimeSet {
     /// Lowest level first; the last level has one word.
     levels: Vec<Vec<u64>>,
 }
 
 impl TimeSet {
     /// An empty set of times below `times`.
-    pub(super) fn new(times: u32) -> Self {
+    pub(crate) fn new(times: u32) -> Self {
         let mut levels = vec![vec![0; (times as usize).div_ceil(64).max(1)]];
         while let Some(words) = levels.last().map(Vec::len).filter(|&words| words > 1) {
             levels.push(vec![0; words.div_ceil(64)]);
@@ -20,7 +20,7 @@ impl TimeSet {
     }
 
     #[inline(always)]
-    pub(super) fn insert(&mut self, time: u32) {
+    pub(crate) fn insert(&mut self, time: u32) {
         let mut at = time as usize;
         for words in &mut self.levels {
             let word = &mut words[at / 64];
@@ -34,7 +34,7 @@ impl TimeSet {
     }
 
     #[inline(always)]
-    pub(super) fn remove(&mut self, time: u32) {
+    pub(crate) fn remove(&mut self, time: u32) {
         let mut at = time as usize;
         for words in &mut self.levels {
             let word = &mut words[at / 64];
@@ -48,7 +48,7 @@ impl TimeSet {
 
     /// The last member not later than `time`.
     #[inline(always)]
-    pub(super) fn last_until(&self, time: u32) -> Option<u32> {
+    pub(crate) fn last_until(&self, time: u32) -> Option<u32> {
         let mut at = time as usize;
         let mut level = 0;
         // Ascends to a word with a member at `at` or before it.
@@ -82,7 +82,7 @@ impl TimeSet {
     }
 
     /// The renumbered set, on an axis of `times`.
-    pub(super) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
+    pub(crate) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
         let mut new = Self::new(times);
         self.iter().for_each(|time| new.insert(numbers.of(time)));
         new
@@ -91,7 +91,7 @@ impl TimeSet {
 
 /// A set of times that counts the members after a time.
 #[derive(Clone, Debug)]
-pub(super) struct CountedTimes {
+pub(crate) struct CountedTimes {
     words: Vec<u64>,
     /// Fenwick tree over blocks of words: members up to each block.
     blocks: Vec<u32>,
@@ -103,7 +103,7 @@ const BLOCK: usize = 8;
 
 impl CountedTimes {
     /// An empty set of times below `times`.
-    pub(super) fn new(times: u32) -> Self {
+    pub(crate) fn new(times: u32) -> Self {
         let words = (times as usize).div_ceil(64).max(1);
         Self {
             words: vec![0; words],
@@ -123,7 +123,7 @@ impl CountedTimes {
     }
 
     #[inline(always)]
-    pub(super) fn insert(&mut self, time: u32) {
+    pub(crate) fn insert(&mut self, time: u32) {
         let word = time as usize / 64;
         self.words[word] |= 1 << (time % 64);
         self.count_in_block(word, 1);
@@ -131,7 +131,7 @@ impl CountedTimes {
 
     /// Removes a member and inserts `end`, which becomes the last one. Returns the number of members between them.
     #[inline(always)]
-    pub(super) fn move_to_end(&mut self, time: u32, end: u32) -> u32 {
+    pub(crate) fn move_to_end(&mut self, time: u32, end: u32) -> u32 {
         let (from, to) = (time as usize / 64, end as usize / 64);
         let behind = self.words[from] >> (time % 64) >> 1;
         let after = if to - from <= 2 * BLOCK {
@@ -163,7 +163,7 @@ impl CountedTimes {
     }
 
     /// The renumbered set: members become the first times of a new axis.
-    pub(super) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
+    pub(crate) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
         let mut new = Self::new(times);
         let members = TimeSet {
             levels: vec![self.words.clone()],
@@ -175,7 +175,7 @@ impl CountedTimes {
 
 /// Maps the times still needed to consecutive new numbers from zero.
 #[derive(Clone, Debug)]
-pub(super) struct Renumbering {
+pub(crate) struct Renumbering {
     needed: Vec<u64>,
     /// Number of needed times before each word.
     before: Vec<u32>,
@@ -184,7 +184,7 @@ pub(super) struct Renumbering {
 
 impl Renumbering {
     /// Keeps the members of these sets.
-    pub(super) fn new<'a>(
+    pub(crate) fn new<'a>(
         counted: &CountedTimes,
         others: impl Iterator<Item = &'a TimeSet>,
     ) -> Self {
@@ -211,13 +211,13 @@ impl Renumbering {
     }
 
     /// Number of times kept.
-    pub(super) fn len(&self) -> u32 {
+    pub(crate) fn len(&self) -> u32 {
         self.count
     }
 
     /// The new number of a time: the number of needed times before it. Times that are not needed keep their
     /// position among the needed ones.
-    pub(super) fn of(&self, time: u32) -> u32 {
+    pub(crate) fn of(&self, time: u32) -> u32 {
         let word = time as usize / 64;
         match self.needed.get(word) {
             None => self.count,

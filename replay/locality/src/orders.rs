@@ -1,8 +1,8 @@
 //! Analyses a trace, with one pass over its lines per order.
 
-use super::figures::Figures;
-use super::place::Place;
-use super::profile::{Profile, StreamCache, check_size};
+use crate::figures::Figures;
+use crate::place::Place;
+use crate::profile::{Profile, StreamCache, check_size};
 use formats::textrace::Pass;
 use formats::view::Eye;
 use rayon::prelude::*;

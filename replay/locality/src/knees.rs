@@ -5,12 +5,12 @@
 //! holds the distinct lines of a row. The measured knee is the smallest fully associative LRU cache that hits half of
 //! those reuses.
 
-use super::figures::Figures;
-use super::place::Origin;
+use crate::figures::Figures;
+use crate::place::Origin;
 use std::collections::HashSet;
 
 /// Stands for a use outside the rows of an eye's picture.
-pub(super) const NO_ROW: u32 = u32::MAX;
+pub(crate) const NO_ROW: u32 = u32::MAX;
 
 /// Distinct lines of rows, and the reuses from one row in another.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.rows += other.rows;
         self.row_lines += other.row_lines;
         if self.distances.len() < other.distances.len() {
@@ -38,7 +38,7 @@ impl Rows {
 
 /// The rows of a stream, while it is analysed.
 #[derive(Clone, Debug, Default)]
-pub(super) struct RowCounts {
+pub(crate) struct RowCounts {
     counts: Rows,
     /// Row and line of every use in this frame.
     used: HashSet<(u32, u32)>,
@@ -46,19 +46,19 @@ pub(super) struct RowCounts {
 }
 
 impl RowCounts {
-    pub(super) fn begin_frame(&mut self) {
+    pub(crate) fn begin_frame(&mut self) {
         self.used.clear();
         self.seen.clear();
     }
 
     /// A use of a line in a row, unless its last use was in the same row of this frame.
-    pub(super) fn enter(&mut self, row: u32, line: u32) {
+    pub(crate) fn enter(&mut self, row: u32, line: u32) {
         self.counts.rows += u64::from(self.seen.insert(row));
         self.counts.row_lines += u64::from(self.used.insert((row, line)));
     }
 
     /// A reuse in another row.
-    pub(super) fn reuse(&mut self, distance: u32) {
+    pub(crate) fn reuse(&mut self, distance: u32) {
         let distance = distance as usize;
         let all = &mut self.counts.distances;
         if distance >= all.len() {
@@ -67,7 +67,7 @@ impl RowCounts {
         all[distance] += 1;
     }
 
-    pub(super) fn finish(self) -> Rows {
+    pub(crate) fn finish(self) -> Rows {
         self.counts
     }
 }

@@ -5,16 +5,16 @@
 //! 1981), counted in O(log n). Immediate reuse changes nothing. A full axis is renumbered, so memory
 //! depends only on the number of distinct lines.
 
-use super::axis::{CountedTimes, Renumbering};
-use super::distances::Distances;
-use super::figures::Figures;
-use super::knees::{NO_ROW, RowCounts};
-use super::last_use::{LastUses, NEVER, Span};
-use super::opt;
-use super::place::{ByOrigin, Origin, Place, TileOfEye, add};
-use super::set_associative::{CacheHits, SetAssociative};
-use super::split::MissSplit;
-use super::working_set::WorkingSets;
+use crate::axis::{CountedTimes, Renumbering};
+use crate::distances::Distances;
+use crate::figures::Figures;
+use crate::knees::{NO_ROW, RowCounts};
+use crate::last_use::{LastUses, NEVER, Span};
+use crate::opt;
+use crate::place::{ByOrigin, Origin, Place, TileOfEye, add};
+use crate::set_associative::{CacheHits, SetAssociative};
+use crate::split::MissSplit;
+use crate::working_set::WorkingSets;
 use sim::config::{ConfigError, LevelConfig, RunConfig, accept};
 use sim::memory::{AnyCache, Cache};
 
@@ -45,7 +45,7 @@ const MOST_LINES: u64 = 1 << 21;
 ///
 /// # Errors
 /// Too many lines.
-pub(super) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
+pub(crate) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
     let lines = |cache: &LevelConfig| cache.size_bytes / u64::from(config.line_bytes);
     let of_first = lines(&config.level.l1).saturating_mul(first_levels.into());
     let found = of_first.saturating_add(lines(&config.level.l2));
@@ -104,7 +104,7 @@ pub struct Profile {
 
 impl Profile {
     /// Largest size in the curves over the configured size rounded up to a power of two.
-    pub(super) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
+    pub(crate) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
 
     /// An empty analysis.
     ///
@@ -115,7 +115,7 @@ impl Profile {
     }
 
     /// An analysis whose first axis has this length, a multiple of 64.
-    pub(super) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
+    pub(crate) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
         let sets = of.cache.sets(of.level, of.line_bytes)?;
         let ways = of.cache.ways;
         let lines = sets * ways;
@@ -185,7 +185,7 @@ impl Profile {
     }
 
     /// Starts a frame. Caches keep their lines.
-    pub(super) fn begin_frame(&mut self) {
+    pub(crate) fn begin_frame(&mut self) {
         self.frame_start = self.now;
         self.frame_first = Span::new(self.tiles + 1, 1);
         self.is_frame_counted = false;

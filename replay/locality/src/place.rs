@@ -24,12 +24,12 @@ impl Place {
 
 /// Tile and eye in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TileOfEye(u32);
+pub(crate) struct TileOfEye(u32);
 
 impl TileOfEye {
-    pub(super) const NONE: Self = Self(0);
+    pub(crate) const NONE: Self = Self(0);
 
-    pub(super) fn of(place: &Place) -> Self {
+    pub(crate) fn of(place: &Place) -> Self {
         let eye = match place.eye {
             None => 0,
             Some(Eye::Left) => 1,
@@ -40,7 +40,7 @@ impl TileOfEye {
 
     /// 0 for the left eye, 1 for the right.
     #[inline(always)]
-    pub(super) fn eye(self) -> Option<usize> {
+    pub(crate) fn eye(self) -> Option<usize> {
         (self.0 & 3).checked_sub(1).map(|eye| eye as usize)
     }
 }
@@ -90,7 +90,7 @@ impl Origin {
 
     /// Classifies a reuse at `now` of a line previously used at `before`.
     #[inline(always)]
-    pub(super) fn of(before: TileOfEye, in_this_frame: bool, now: TileOfEye) -> Self {
+    pub(crate) fn of(before: TileOfEye, in_this_frame: bool, now: TileOfEye) -> Self {
         if !in_this_frame {
             Self::EarlierFrame
         } else if before == now {
@@ -108,7 +108,7 @@ impl Origin {
 pub type ByOrigin = [u64; 4];
 
 /// Adds counts.
-pub(super) fn add(to: &mut ByOrigin, from: &ByOrigin) {
+pub(crate) fn add(to: &mut ByOrigin, from: &ByOrigin) {
     for (to, from) in to.iter_mut().zip(from) {
         *to += from;
     }

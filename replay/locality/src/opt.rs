@@ -7,25 +7,25 @@
 //! that became free last before its start. This needs no look-ahead, so one pass over the stream suffices,
 //! and many sizes share it.
 
-use super::axis::{Renumbering, TimeSet};
-use super::place::ByOrigin;
+use crate::axis::{Renumbering, TimeSet};
+use crate::place::ByOrigin;
 
 /// A fully associative cache under OPT.
 #[derive(Clone, Debug)]
-pub(super) struct FullyAssociative {
+pub(crate) struct FullyAssociative {
     /// Capacity.
-    pub(super) lines: u32,
+    pub(crate) lines: u32,
     /// Times at which places became free: the last use before the end of the interval they held.
     free_since: TimeSet,
     /// Places without an interval so far.
     unused: u32,
     /// Hits by location of the previous use.
-    pub(super) hits: ByOrigin,
+    pub(crate) hits: ByOrigin,
 }
 
 impl FullyAssociative {
     /// An empty cache of at least one line, on an axis of `times`.
-    pub(super) fn new(lines: u32, times: u32) -> Self {
+    pub(crate) fn new(lines: u32, times: u32) -> Self {
         Self {
             lines,
             free_since: TimeSet::new(times),
@@ -37,7 +37,7 @@ impl FullyAssociative {
     /// Processes a use whose previous use at `before` is earlier than the access before `now`. Returns
     /// whether the line was kept.
     #[inline(always)]
-    pub(super) fn reuse(&mut self, before: u32, now: u32) -> bool {
+    pub(crate) fn reuse(&mut self, before: u32, now: u32) -> bool {
         if let Some(free) = self.free_since.last_until(before) {
             self.free_since.remove(free);
         } else if self.unused > 0 {
@@ -50,30 +50,30 @@ impl FullyAssociative {
     }
 
     /// Times at which its places became free.
-    pub(super) fn times(&self) -> &TimeSet {
+    pub(crate) fn times(&self) -> &TimeSet {
         &self.free_since
     }
 
-    pub(super) fn renumber(&mut self, numbers: &Renumbering, times: u32) {
+    pub(crate) fn renumber(&mut self, numbers: &Renumbering, times: u32) {
         self.free_since = self.free_since.renumbered(numbers, times);
     }
 }
 
 /// A set-associative cache under OPT, with independent sets.
 #[derive(Clone, Debug)]
-pub(super) struct OptSets {
+pub(crate) struct OptSets {
     /// By set: the time of its last use, then the times since which its other places are free. Times count
     /// from 1; zero is before all.
     sets: Vec<u32>,
     ways: usize,
     set_mask: u32,
     /// Hits by location of the previous use.
-    pub(super) hits: ByOrigin,
+    pub(crate) hits: ByOrigin,
 }
 
 impl OptSets {
     /// An empty cache; `sets` is a power of two.
-    pub(super) fn new(sets: u32, ways: u32) -> Self {
+    pub(crate) fn new(sets: u32, ways: u32) -> Self {
         Self {
             sets: vec![0; sets as usize * ways as usize],
             ways: ways as usize,
@@ -84,7 +84,7 @@ impl OptSets {
 
     /// Processes a first use or a use after `before`. Returns whether the line was kept.
     #[inline(always)]
-    pub(super) fn access(&mut self, line: u32, before: Option<u32>, now: u32) -> bool {
+    pub(crate) fn access(&mut self, line: u32, before: Option<u32>, now: u32) -> bool {
         let first = (line & self.set_mask) as usize * self.ways;
         let set = &mut self.sets[first..first + self.ways];
         let Some((last, free)) = set.split_first_mut() else {
@@ -102,7 +102,7 @@ impl OptSets {
         hit
     }
 
-    pub(super) fn renumber(&mut self, numbers: &Renumbering) {
+    pub(crate) fn renumber(&mut self, numbers: &Renumbering) {
         for time in self.sets.iter_mut().filter(|time| **time > 0) {
             *time = numbers.of(*time - 1) + 1;
         }

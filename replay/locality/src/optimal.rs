@@ -1,6 +1,6 @@
 //! Belady's OPT for one cache over a recorded stream.
 
-use super::opt::{FullyAssociative, OptSets};
+use crate::opt::{FullyAssociative, OptSets};
 use sim::config::{ConfigError, LevelConfig};
 use std::collections::HashMap;
 

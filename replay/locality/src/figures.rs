@@ -1,11 +1,11 @@
 //! The results of analysing a stream of lines.
 
-use super::distances::Distances;
-use super::knees::Rows;
-use super::place::{ByOrigin, add};
-use super::set_associative::CacheHits;
-use super::split::MissSplit;
-use super::working_set::WorkingSet;
+use crate::distances::Distances;
+use crate::knees::Rows;
+use crate::place::{ByOrigin, add};
+use crate::set_associative::CacheHits;
+use crate::split::MissSplit;
+use crate::working_set::WorkingSet;
 
 /// Figures of the lines looked up in a cache. Those of several caches of a level are sums.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

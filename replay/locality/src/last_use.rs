@@ -1,49 +1,49 @@
 //! Time and place of the last use of each used line.
 
-use super::knees::NO_ROW;
-use super::place::TileOfEye;
+use crate::knees::NO_ROW;
+use crate::place::TileOfEye;
 
 /// No time.
-pub(super) const NEVER: u32 = u32::MAX;
+pub(crate) const NEVER: u32 = u32::MAX;
 
 /// The last use of a line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LastUse {
+pub(crate) struct LastUse {
     /// Time on the axis of the stream; [`NEVER`] for an unused line.
-    pub(super) time: u32,
+    pub(crate) time: u32,
     /// Tile and eye.
-    pub(super) place: TileOfEye,
+    pub(crate) place: TileOfEye,
     /// Row of tiles, or [`NO_ROW`].
-    pub(super) row: u32,
+    pub(crate) row: u32,
     /// Work item of the last use by any eye, by the left and by the right; zero for never.
-    pub(super) span: Span,
-    pub(super) span_of_eye: [Span; 2],
+    pub(crate) span: Span,
+    pub(crate) span_of_eye: [Span; 2],
 }
 
 /// A work item on the clock of tiles: its first tile, counted from 1, and its number of tiles. Zero stands
 /// for none. Later items compare as larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Span(u32);
+pub(crate) struct Span(u32);
 
 impl Span {
     /// Maximum number of tiles of a stream.
-    pub(super) const MOST_TILES: u32 = (1 << 31) - 2;
+    pub(crate) const MOST_TILES: u32 = (1 << 31) - 2;
 
     /// `tiles` is 1 or 2.
-    pub(super) fn new(first: u32, tiles: u32) -> Self {
+    pub(crate) fn new(first: u32, tiles: u32) -> Self {
         Self(first << 1 | u32::from(tiles > 1))
     }
 
-    pub(super) fn is_none(self) -> bool {
+    pub(crate) fn is_none(self) -> bool {
         self.0 == 0
     }
 
-    pub(super) fn first(self) -> u32 {
+    pub(crate) fn first(self) -> u32 {
         self.0 >> 1
     }
 
     /// Number of tiles after the first.
-    pub(super) fn beyond(self) -> u32 {
+    pub(crate) fn beyond(self) -> u32 {
         self.0 & 1
     }
 }
@@ -63,7 +63,7 @@ const PAGE: usize = 64;
 
 /// Last uses by line. Pages without a used line take no memory.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LastUses {
+pub(crate) struct LastUses {
     /// Page number, counted from 1; zero for no page.
     directory: Vec<u32>,
     pages: Vec<[LastUse; PAGE]>,
@@ -71,7 +71,7 @@ pub(super) struct LastUses {
 
 impl LastUses {
     #[inline(always)]
-    pub(super) fn of(&mut self, line: u32) -> &mut LastUse {
+    pub(crate) fn of(&mut self, line: u32) -> &mut LastUse {
         let (page, slot) = (line as usize / PAGE, line as usize % PAGE);
         let number = match self.directory.get(page) {
             Some(&number) if number != 0 => number,
@@ -92,7 +92,7 @@ impl LastUses {
     }
 
     /// The lines used so far.
-    pub(super) fn used(&mut self) -> impl Iterator<Item = &mut LastUse> {
+    pub(crate) fn used(&mut self) -> impl Iterator<Item = &mut LastUse> {
         let lines = self.pages.iter_mut().flatten();
         lines.filter(|line| line.time != NEVER)
     }

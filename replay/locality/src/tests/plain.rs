@@ -1,7 +1,7 @@
 //! The plainest implementation of each figure.
 
 use super::Access;
-use crate::locality::{ByOrigin, MissSplit, Origin, Rows, StreamCache, WorkingSet};
+use crate::{ByOrigin, MissSplit, Origin, Rows, StreamCache, WorkingSet};
 use formats::view::Eye;
 use sim::memory::AnyCache;
 use std::collections::{HashMap, HashSet};
@@ -28,7 +28,7 @@ pub fn origins(stream: &[Access]) -> Vec<Option<Origin>> {
 }
 
 /// The accesses marked in `which`, by location of the previous use.
-pub(super) fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
+pub(crate) fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
     let mut counts = ByOrigin::default();
     for (origin, _) in origins.iter().zip(which).filter(|(_, which)| **which) {
         counts[origin.expect("a first use cannot hit").index()] += 1;

@@ -1,7 +1,7 @@
 //! Classifies misses as compulsory, capacity and conflict misses (Hill & Smith 1989), access by access as
 //! Dinero IV does.
 
-use super::place::{ByOrigin, add};
+use crate::place::{ByOrigin, add};
 
 /// Accesses of a cache, compared with a fully associative LRU cache of its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct MissSplit {
 
 impl MissSplit {
     #[inline(always)]
-    pub(super) fn count(&mut self, origin: usize, hit: bool, hit_fully_associative: bool) {
+    pub(crate) fn count(&mut self, origin: usize, hit: bool, hit_fully_associative: bool) {
         let counts = match (hit, hit_fully_associative) {
             (true, true) => &mut self.hits_of_both,
             (true, false) => &mut self.avoided,
@@ -48,7 +48,7 @@ impl MissSplit {
     }
 
     /// Adds the counts of another cache.
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         self.compulsory += other.compulsory;
         add(&mut self.capacity, &other.capacity);
         add(&mut self.conflict, &other.conflict);

@@ -1,6 +1,6 @@
 //! Set-associative LRU caches of many sizes and ways, simulated by the forest that sweeps use.
 
-use super::place::{ByOrigin, add};
+use crate::place::{ByOrigin, add};
 use sim::memory::Forest;
 
 /// Hits of a cache.
@@ -16,7 +16,7 @@ pub struct CacheHits {
 
 /// Caches that receive the same lines.
 #[derive(Clone, Debug)]
-pub(super) struct SetAssociative {
+pub(crate) struct SetAssociative {
     forest: Forest,
     trees: Vec<Tree>,
     depths: Vec<u8>,
@@ -34,7 +34,7 @@ struct Tree {
 
 impl SetAssociative {
     /// Empty caches of at least one geometry: sets (a power of two) and ways.
-    pub(super) fn new(mut geometries: Vec<(u32, u32)>) -> Self {
+    pub(crate) fn new(mut geometries: Vec<(u32, u32)>) -> Self {
         geometries.sort_unstable();
         geometries.dedup();
         let tree = |same_sets: &[(u32, u32)]| {
@@ -59,7 +59,7 @@ impl SetAssociative {
 
     /// Accesses a line for the first time or again.
     #[inline(always)]
-    pub(super) fn access(&mut self, line: u32, origin: Option<usize>) {
+    pub(crate) fn access(&mut self, line: u32, origin: Option<usize>) {
         self.forest.access(line, &mut self.depths);
         let Some(origin) = origin else { return };
         for (tree, &depth) in self.trees.iter_mut().zip(&self.depths) {
@@ -68,7 +68,7 @@ impl SetAssociative {
     }
 
     /// Hits of each cache, by number of sets and ways.
-    pub(super) fn hits(&self) -> Vec<CacheHits> {
+    pub(crate) fn hits(&self) -> Vec<CacheHits> {
         let of_tree = |tree: &Tree| {
             let hits = |&ways: &u32| {
                 let mut hits = ByOrigin::default();

@@ -5,8 +5,8 @@
 //! pass that counts gaps answers all lengths. Gaps are counted in bins that end at powers of two, each with
 //! its sum, so lengths that are powers of two are exact.
 
-use super::last_use::{LastUse, Span};
-use super::place::TileOfEye;
+use crate::last_use::{LastUse, Span};
+use crate::place::TileOfEye;
 
 /// Bins up to 2^32.
 const BINS: usize = 33;
@@ -113,7 +113,7 @@ impl WorkingSet {
     }
 
     /// Adds the windows of another core.
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         sim::add_fields!(self, other, stretches, lines, lines_of_either);
         for (lines, other) in self.lines_of_eye.iter_mut().zip(other.lines_of_eye) {
             *lines += other;
@@ -123,7 +123,7 @@ impl WorkingSet {
 
 /// The gaps of each class of uses.
 #[derive(Clone, Debug, Default)]
-pub(super) struct WorkingSets {
+pub(crate) struct WorkingSets {
     any: Gaps,
     eyes: [Gaps; 2],
     either: Gaps,
@@ -131,7 +131,7 @@ pub(super) struct WorkingSets {
 
 impl WorkingSets {
     /// Processes a use whose tile or item differs from the last use.
-    pub(super) fn used(&mut self, last: &mut LastUse, here: TileOfEye, now: Span) {
+    pub(crate) fn used(&mut self, last: &mut LastUse, here: TileOfEye, now: Span) {
         if last.span < now {
             self.any.used(last.span, now);
             last.span = now;
@@ -148,7 +148,7 @@ impl WorkingSets {
     }
 
     /// Ends the stream for a line, with the clock at `tiles`.
-    pub(super) fn ended(&mut self, last: &LastUse, tiles: u32) {
+    pub(crate) fn ended(&mut self, last: &LastUse, tiles: u32) {
         let [left, right] = last.span_of_eye;
         self.any.ended(last.span, tiles);
         self.either.ended(left.max(right), tiles);
@@ -158,7 +158,7 @@ impl WorkingSets {
     }
 
     /// Every length that is a power of two and at most `tiles`.
-    pub(super) fn curve(&self, tiles: u32) -> Vec<WorkingSet> {
+    pub(crate) fn curve(&self, tiles: u32) -> Vec<WorkingSet> {
         let lengths = (0..32).take_while(|power| 1 << power <= u64::from(tiles));
         lengths
             .map(|power| WorkingSet {
