@@ -226,6 +226,11 @@ const OVER_INPUTS: &[(&str, &str)] = &[
     ),
     ("replay", "convert x.html --to din -o OUT"),
     ("replay", "run a.textrace --config x.html --timeline OUT"),
+    ("replay", "schedule x.html --html OUT"),
+    (
+        "replay",
+        "schedule a.textrace --config x.html --timeline OUT",
+    ),
     ("replay", "locality --addresses x.html --html OUT"),
     ("replay", "report a.textrace --image atrium=x.html -o OUT"),
     ("replay", "dump x.html --parquet OUT"),
@@ -264,6 +269,32 @@ fn inputs_of_every_kind_are_kept_under_all_of_their_names() {
     for name in ["x.html", "hard", "so/X"] {
         assert_eq!(fs::read(at(name)).expect("readable"), b"kept", "{name}");
     }
+}
+
+#[test]
+fn a_schedule_has_a_page_and_a_timeline_of_one_bandwidth() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [page, timeline] = ["p.html", "t.json"].map(|name| folder.path().join(name));
+    let schedule = |bandwidths: &str| {
+        let mut command = program("replay");
+        command.arg("schedule").arg(golden("atrium.textrace"));
+        command.args(["--schedulers", "z2-sta", "--bandwidth", bandwidths]);
+        command.arg("--html").arg(&page).arg("--timeline");
+        command.arg(&timeline);
+        command
+    };
+    let found = "expected one trace and one bandwidth, found 1 and 2";
+    refuse(&mut schedule("2,4"), &["--timeline", found]);
+    assert!(!page.exists() && !timeline.exists());
+    run_ok(&mut schedule("4"));
+    let page = fs::read_to_string(page).expect("a page");
+    assert!(page.contains("<svg") && page.contains("waits for DRAM"));
+    let text = fs::read_to_string(timeline).expect("a timeline");
+    let events: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let events = events["traceEvents"].as_array().expect("events");
+    let named = events.iter().filter(|of| of["name"] == "process_name");
+    let names: Vec<_> = named.map(|of| of["args"]["name"].clone()).collect();
+    assert_eq!(names, ["first-idle", "z2-sta"]);
 }
 
 #[test]

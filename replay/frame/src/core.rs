@@ -7,6 +7,7 @@
 
 use super::counts::Counts;
 use super::machine::Machine;
+use super::timeline::CoreRecord;
 use super::work::{Part, Warp};
 use sim::config::ConfigError;
 use sim::memory::{AnyCache, Cache, TICKS};
@@ -37,6 +38,8 @@ pub struct Held {
     next: usize,
     /// Warps that have not finished.
     pub left: usize,
+    /// The cycle in which the core took it.
+    since: u64,
 }
 
 /// A warp in flight.
@@ -107,6 +110,8 @@ pub struct Core {
     counted: u64,
     /// Counters.
     pub counts: Counts,
+    /// The timeline, if it is recorded.
+    pub record: Option<Box<CoreRecord>>,
 }
 
 impl Core {
@@ -139,6 +144,7 @@ impl Core {
             blocked: false,
             counted: 0,
             counts: Counts::default(),
+            record: None,
         })
     }
 
@@ -156,6 +162,7 @@ impl Core {
             part,
             next: 0,
             left,
+            since: now,
         });
         self.blocked = false;
         Some(slot)
@@ -164,7 +171,12 @@ impl Core {
     /// Frees the slot of a written tile.
     pub fn release(&mut self, slot: usize, now: u64) -> Option<Part> {
         self.count_until(now);
-        self.held[slot].take().map(|held| held.part)
+        let held = self.held[slot].take()?;
+        if let Some(record) = &mut self.record {
+            let cycles = [held.since, now];
+            record.held.push((slot, cycles, held.part.index));
+        }
+        Some(held.part)
     }
 
     /// Counts the cycles before `now` by cause. To be called before anything in the core changes in cycle `now`.
@@ -173,6 +185,7 @@ impl Core {
         if from >= now {
             return;
         }
+        let before = *cycles;
         self.counted = now;
         self.counts.warps_in_flight += self.in_flight * (now - from);
         let alu_end = self.alu_free.div_ceil(TICKS).clamp(from, now);
@@ -198,6 +211,10 @@ impl Core {
             &mut cycles.latency
         };
         *cause += now - filter_end;
+        if let Some(record) = &mut self.record {
+            let (all, before) = (cycles.list(), before.list());
+            record.add(from, std::array::from_fn(|at| all[at] - before[at]));
+        }
     }
 
     /// Marks a line in flight as coming from DRAM. Returns the item that fetched it.

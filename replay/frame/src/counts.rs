@@ -29,10 +29,37 @@ pub struct CoreCycles {
 }
 
 impl CoreCycles {
+    /// Names of the causes, in the order of [`Self::list`].
+    pub const NAMES: [&str; 9] = [
+        "issue",
+        "texture",
+        "no work",
+        "barrier",
+        "raster",
+        "MSHR",
+        "DRAM",
+        "L2",
+        "pipelines",
+    ];
+
+    /// Cycles by cause, in the order of the fields.
+    pub const fn list(&self) -> [u64; 9] {
+        [
+            self.issue,
+            self.texture,
+            self.no_work,
+            self.barrier,
+            self.raster,
+            self.mshr,
+            self.dram,
+            self.l2,
+            self.latency,
+        ]
+    }
+
     /// All cycles.
-    pub const fn all(&self) -> u64 {
-        let work = self.issue + self.texture + self.raster + self.latency;
-        work + self.no_work + self.barrier + self.mshr + self.dram + self.l2
+    pub fn all(&self) -> u64 {
+        self.list().iter().sum()
     }
 
     /// Adds other cycles.

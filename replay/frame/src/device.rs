@@ -5,9 +5,11 @@ use super::counts::Counts;
 use super::dram::{Answer, Dram};
 use super::l2::{Found, L2};
 use super::machine::Machine;
+use super::timeline::{FrameTimeline, TileSpan};
 use super::work::Part;
 use sim::config::ConfigError;
 use sim::memory::{Calendar, Servers};
+use sim::order::WorkItem;
 use sim::sums::Unbalanced;
 use std::collections::VecDeque;
 
@@ -79,6 +81,7 @@ pub struct Device {
     counts: Counts,
     /// Lines from DRAM, by position of the item in the scheduler's list.
     pub pressure: Vec<u64>,
+    spans: Vec<TileSpan>,
 }
 
 impl Device {
@@ -105,7 +108,38 @@ impl Device {
             spare: Vec::new(),
             counts: Counts::default(),
             pressure: Vec::new(),
+            spans: Vec::new(),
             machine: machine.clone(),
+        })
+    }
+
+    /// Records the timeline.
+    pub fn record(&mut self) {
+        for core in &mut self.cores {
+            core.record = Some(Box::default());
+        }
+    }
+
+    /// Keeps the spans of a phase that has ended, with the tiles of its items.
+    pub fn keep_spans(&mut self, items: &[WorkItem]) {
+        for (core, of) in self.cores.iter_mut().enumerate() {
+            let held = of.record.iter_mut().flat_map(|of| of.held.drain(..));
+            self.spans
+                .extend(held.map(|(slot, cycles, index)| TileSpan {
+                    core,
+                    slot,
+                    cycles,
+                    tiles: items[index].tiles().collect(),
+                }));
+        }
+    }
+
+    /// The timeline, if it was recorded.
+    pub fn timeline(self) -> Option<FrameTimeline> {
+        let records = self.cores.into_iter().map(|of| Some(of.record?.causes));
+        Some(FrameTimeline {
+            causes: records.collect::<Option<_>>()?,
+            spans: self.spans,
         })
     }
 

@@ -13,6 +13,7 @@
 //! | `items` | the items of a scheduler as warps of the cores |
 //! | `schedulers/` | the schedulers, one a file |
 //! | `replay` | the frames of a trace |
+//! | `timeline` | a replay over time |
 //! | `figures` | milliseconds, bytes, energy and the lower bound |
 //!
 //! In each cycle, these phases follow each other: DRAM answers; lines from the L2 enter the ports of the cores; lines
@@ -29,6 +30,7 @@ mod l2;
 mod machine;
 mod replay;
 pub mod schedulers;
+mod timeline;
 mod work;
 
 pub use counts::{CoreCycles, Counts};
@@ -36,6 +38,7 @@ pub use device::{Device, Source};
 pub use figures::{Bound, Energy, Figures};
 pub use machine::{DramModel, Machine, Settings};
 pub use replay::{FrameTime, Point, ReplayError, replay};
+pub use timeline::{FrameTimeline, TileSpan};
 pub use work::{Part, Request, Warp};
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::device::Device;
 use super::items::{Items, Pictures};
 use super::machine::{Machine, Settings};
 use super::schedulers::{Inputs, Pressure, Queue, Scheduler, order_of};
+use super::timeline::FrameTimeline;
 use formats::textrace::Tile;
 use rayon::prelude::*;
 use sim::config::{BetweenFrames, ConfigError, RunConfig, accept};
@@ -23,6 +24,8 @@ pub struct Point {
     pub scheduler: Scheduler,
     /// Parameters of the machine.
     pub settings: Settings,
+    /// Whether its timeline is recorded.
+    pub records: bool,
 }
 
 /// The time of the frames of a trace.
@@ -36,6 +39,8 @@ pub struct FrameTime {
     pub unique_lines: u64,
     /// Tiles that were not rendered, and all tiles.
     pub skipped_tiles: [u64; 2],
+    /// The replay over time, if the point records it.
+    pub timeline: Option<FrameTimeline>,
 }
 
 /// Reasons why a replay fails.
@@ -148,6 +153,7 @@ pub fn replay(
     let unique_lines = walk.counts().unique_lines;
     let finish = |run: Run| FrameTime {
         unique_lines,
+        timeline: run.device.and_then(Device::timeline),
         ..run.out
     };
     Ok(runs.into_iter().map(finish).collect())
@@ -177,6 +183,7 @@ impl Run {
                 frames: Vec::new(),
                 unique_lines: 0,
                 skipped_tiles: [0; 2],
+                timeline: None,
             },
             config,
             machine,
@@ -201,7 +208,13 @@ impl Run {
         }
         let mut device = match self.device.take() {
             Some(device) => device,
-            None => Device::new(&self.machine)?,
+            None => {
+                let mut device = Device::new(&self.machine)?;
+                if self.point.records {
+                    device.record();
+                }
+                device
+            }
         };
         let (counted, skipped) = self.phases(&mut device, source, frame, plan, signatures)?;
         let (counts, now) = (device.counts()?, device.now());
@@ -256,6 +269,7 @@ impl Run {
                 row.priority_warps,
             );
             device.run(&mut items)?;
+            device.keep_spans(&queue.items);
             for (item, lines) in queue.items.iter().zip(&device.pressure) {
                 counted.add(item, *lines);
             }

@@ -3,10 +3,14 @@
 use super::answers;
 use super::columns::{Columns, columns_of};
 use super::document::Document;
+use super::html::{self, Answer, Page};
 use super::lists::{geometric_mean, unique};
+use super::plots::stacked::StackedChart;
+use super::plots::{PlotError, SeriesStyle};
 use super::table::{Style, Table};
 use frame::schedulers::{Hardware, Scheduler, bits};
-use frame::{Figures, FrameTime, Settings};
+use frame::{CoreCycles, Figures, FrameTime, Settings};
+use maud::html;
 use serde::Serialize;
 use sim::config::RunConfig;
 use sim::figure::Figure;
@@ -35,6 +39,21 @@ pub struct ScheduleRow {
 pub const INSTRUCTIONS: [f64; 3] = [1.0, 0.5, 2.0];
 
 const OVER: &str = "half to twice the instructions";
+
+/// Name and cycles of a part of the bars.
+type BarPart = (&'static str, fn(&CoreCycles) -> u64);
+
+/// From bottom to top.
+const BAR_PARTS: [BarPart; 8] = [
+    ("issues", |of| of.issue),
+    ("texture unit filters", |of| of.texture),
+    ("waits for DRAM", |of| of.dram),
+    ("waits for the L2", |of| of.l2),
+    ("waits for an MSHR", |of| of.mshr),
+    ("pipelines and rasteriser", |of| of.latency + of.raster),
+    ("barrier or writing", |of| of.barrier),
+    ("no work", |of| of.no_work),
+];
 
 impl ScheduleRow {
     /// The row of replays with each of [`INSTRUCTIONS`].
@@ -79,9 +98,16 @@ impl ScheduleRow {
     }
 
     /// Share of the cores' cycles, in percent.
-    fn share(&self, of: impl Fn(&frame::CoreCycles) -> u64) -> f64 {
+    fn share(&self, of: impl Fn(&CoreCycles) -> u64) -> f64 {
         let cycles = &self.times[0].core_cycles;
         100.0 * of(cycles) as f64 / cycles.all().max(1) as f64
+    }
+
+    /// Milliseconds of a frame by [`BAR_PARTS`], means of all cores.
+    fn parts_ms(&self) -> Vec<f64> {
+        let ms = self.times[0].ms();
+        let parts = BAR_PARTS.iter();
+        parts.map(|(_, of)| ms * self.share(of) / 100.0).collect()
     }
 
     fn per_frame(&self, sum: f64) -> f64 {
@@ -143,6 +169,60 @@ impl ScheduleReport {
         };
         let ends = [mean(|of| of.low), mean(|of| of.high)];
         Figure::bounded(mean(|of| of.value), ends, OVER.to_owned())
+    }
+
+    /// Stacked bars of the schedulers, one chart per trace and bandwidth.
+    fn bars(&self) -> Vec<StackedChart> {
+        let series = (0..).zip(BAR_PARTS);
+        let series = series.map(|(at, (name, _))| SeriesStyle::nth(name, at));
+        let series: Vec<SeriesStyle> = series.collect();
+        let charts = self
+            .rows
+            .chunk_by(|a, b| (&a.trace, a.bandwidth_gb_s) == (&b.trace, b.bandwidth_gb_s));
+        let chart = |rows: &[ScheduleRow]| StackedChart {
+            title: match rows[0].bandwidth_gb_s {
+                Some(gb_s) => format!("{}, {gb_s} GB/s", rows[0].trace),
+                None => rows[0].trace.clone(),
+            },
+            value_label: "time of a frame, ms".into(),
+            bar_label: "scheduler".into(),
+            series: series.clone(),
+            bars: rows
+                .iter()
+                .map(|row| (row.scheduler.name().to_owned(), row.parts_ms()))
+                .collect(),
+            bar_px: 70.0,
+            highest: None,
+            decimals: Some(2),
+        };
+        charts.map(chart).collect()
+    }
+
+    /// The page.
+    ///
+    /// # Errors
+    /// A plot that could not be drawn.
+    pub fn page(&self) -> Result<String, PlotError> {
+        let mut charts = self.bars().into_iter().map(|of| of.svg());
+        let answer = Answer {
+            sentences: self.answer(),
+            chart: html::chart(charts.next(), "")?,
+            about: html! { p {
+                "A bar is the mean time of a frame; its parts are the mean over the cores. A cycle in which a core neither issues nor filters counts for one cause. "
+                "The JSON and CSV files beside this page have all figures."
+            } },
+        };
+        let mut page = Page::default();
+        if charts.len() > 0 {
+            page.add("Other traces and bandwidths", html::charts(charts)?);
+        }
+        page.add("Schedulers", self.table().markup());
+        let machine = html! {
+            (html::settings("configuration (TOML)", &self.config))
+            (html::settings("other parameters (TOML)", &self.settings))
+        };
+        page.add("Machine", machine);
+        Ok(page.text("Parallax: frame time by scheduler", &answer))
     }
 
     fn schedulers(&self) -> Vec<Scheduler> {
@@ -256,9 +336,16 @@ impl Document for ScheduleReport {
         ]
     }
 
-    #[rustfmt::skip]
     fn text(&self, style: Style) -> String {
-        let waits = |c: &frame::CoreCycles| c.mshr + c.dram + c.l2;
+        self.table().styled(style)
+    }
+}
+
+impl ScheduleReport {
+    /// The table of a terminal.
+    #[rustfmt::skip]
+    fn table(&self) -> Table {
+        let waits = |c: &CoreCycles| c.mshr + c.dram + c.l2;
         let several = self.rows.iter().any(|row| row.trace != self.rows[0].trace);
         let columns = columns_of::<ScheduleRow>()
             .text("trace", "trace", move |r| several.then(|| r.trace.clone()))
@@ -273,7 +360,66 @@ impl Document for ScheduleReport {
             .real("memory", "mem", "%", 0, move |r| r.share(waits))
             .real("other", "rest", "%", 0, move |r| r.share(|c| c.all() - c.issue - c.texture - waits(c)))
             .real("bits", "bits", "", 0, |r| r.bits as f64);
-        let table = Table::new(&columns, &self.rows).without_empty_columns();
-        table.styled(style)
+        Table::new(&columns, &self.rows).without_empty_columns()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timeline::frames_json;
+    use frame::{Point, replay};
+    use serde_json::Value;
+    use sim::stream::TileSource;
+    use sim::stream::testing::different_frames;
+
+    #[test]
+    fn bars_add_up_to_the_time_of_a_frame_and_counters_to_its_cycles() {
+        let (trace, config) = (different_frames(), RunConfig::default());
+        let settings = Settings::default();
+        let schedulers = ["first-idle", "quads-in-turn"].map(|name| Scheduler::find(name).unwrap());
+        let points = schedulers.map(|scheduler| Point {
+            scheduler,
+            settings,
+            records: true,
+        });
+        let times = replay(&trace, &config, &points, &|_| {}).unwrap();
+        let row = |(of, time): (&FrameTime, Scheduler)| {
+            let (of, first) = (std::slice::from_ref(of), &times[..1]);
+            ScheduleRow::new("frames", time, None, of, first, [1, 1], 4)
+        };
+        let report = ScheduleReport {
+            rows: times.iter().zip(schedulers).map(row).collect(),
+            config,
+            settings,
+        };
+        let [chart] = &report.bars()[..] else {
+            panic!("one trace and one bandwidth");
+        };
+        for ((name, parts), row) in chart.bars.iter().zip(&report.rows) {
+            let (sum, ms) = (parts.iter().sum::<f64>(), row.ms().value);
+            assert!((sum / ms - 1.0).abs() < 1e-12, "{name}: {sum}, {ms}");
+        }
+        let page = report.page().unwrap();
+        assert!(page.contains("waits for DRAM") && page.contains("quads-in-turn"));
+
+        let named = [("first-idle", &times[0]), ("quads-in-turn", &times[1])];
+        let text = frames_json(&named, &trace.tables().passes).unwrap();
+        let found: Value = serde_json::from_str(&text).unwrap();
+        let events = found["traceEvents"].as_array().unwrap();
+        for (process, (_, time)) in (1_u64..).zip(named) {
+            let of_kind = |kind: &'static str| {
+                let is_own = move |e: &&Value| e["ph"] == kind && e["pid"] == process;
+                events.iter().filter(is_own)
+            };
+            let values = of_kind("C").flat_map(|e| e["args"].as_object().unwrap().values());
+            let cycles: u64 = values.map(|value| value.as_u64().unwrap()).sum();
+            let all: u64 = time.frames.iter().map(|(cycles, _)| cycles).sum();
+            assert_eq!(cycles, all * u64::from(config.cores));
+            let spans = &time.timeline.as_ref().unwrap().spans;
+            assert_eq!(of_kind("X").count(), time.frames.len() + spans.len());
+            let tracks = 1 + (config.cores * settings.tiles) as usize;
+            assert_eq!(of_kind("M").count(), 1 + tracks);
+        }
     }
 }

@@ -3,7 +3,8 @@
 
 use formats::textrace::{Pass, Tables};
 use formats::view::Eye;
-use serde_json::{Value, json};
+use frame::{CoreCycles, FrameTime};
+use serde_json::{Map, Value, json};
 use sim::result::{TileAt, Timeline, TimelineItem};
 
 /// Process numbers of the two groups of tracks.
@@ -25,12 +26,22 @@ pub fn json(timeline: &Timeline, tables: &Tables, line_bytes: u32) -> serde_json
         events.push(name("thread_name", CORES, core, &format!("core {core}")));
     }
     for item in &timeline.items {
-        events.push(slice(item, &tables.passes));
+        events.push(slice(
+            &titles(item.tiles.iter().copied(), &tables.passes),
+            [CORES, item.core],
+            [item.start_cycle, item.end_cycle],
+            json!({
+                "start_cycle": item.start_cycle,
+                "end_cycle": item.end_cycle,
+                "useful_cycles": item.useful_cycles,
+                "wasted_cycles": item.wasted_cycles,
+            }),
+        ));
         events.push(counter(
             CORES,
             &format!("core {}: texture unit", item.core),
             item.start_cycle,
-            ("useful %", utilization_pct(item)),
+            json!({"useful %": utilization_pct(item)}),
         ));
     }
     for (interval, &lines) in (0..).zip(&timeline.fetched_lines) {
@@ -39,9 +50,64 @@ pub fn json(timeline: &Timeline, tables: &Tables, line_bytes: u32) -> serde_json
             MEMORY,
             "texture reads",
             interval * Timeline::INTERVAL_CYCLES,
-            ("bytes per cycle", bytes / Timeline::INTERVAL_CYCLES as f64),
+            json!({"bytes per cycle": bytes / Timeline::INTERVAL_CYCLES as f64}),
         ));
     }
+    file(&events)
+}
+
+/// The file of frame times, each a process with its name: the frames, the tiles that each slot of a core holds, and the
+/// cycles of each core by cause, of which an interval has [`Timeline::INTERVAL_CYCLES`].
+///
+/// # Errors
+/// A number that JSON cannot hold.
+pub fn frames_json(times: &[(&str, &FrameTime)], passes: &[Pass]) -> serde_json::Result<String> {
+    let mut events = Vec::new();
+    for (process, (title, time)) in (1..).zip(times) {
+        let Some(timeline) = &time.timeline else {
+            continue;
+        };
+        events.push(name("process_name", process, 0, title));
+        events.push(name("thread_name", process, 0, "frames"));
+        let (slots, mut start) = (time.machine.tiles, 0);
+        for (number, (cycles, _)) in time.frames.iter().enumerate() {
+            let (track, span) = ([process, 0], [start, start + cycles]);
+            events.push(slice(&format!("frame {number}"), track, span, json!({})));
+            start += cycles;
+        }
+        for core in 0..time.machine.cores {
+            for slot in 0..slots {
+                let track = format!("core {core}, tile slot {slot}");
+                let thread = 1 + core * slots + slot;
+                events.push(name("thread_name", process, thread as u32, &track));
+            }
+        }
+        for span in &timeline.spans {
+            let tiles = span.tiles.iter().map(|of| TileAt {
+                pass: of.pass,
+                tile: of.tile,
+            });
+            let thread = 1 + span.core * slots + span.slot;
+            let track = [process, thread as u32];
+            events.push(slice(&titles(tiles, passes), track, span.cycles, json!({})));
+        }
+        for (core, causes) in timeline.causes.iter().enumerate() {
+            let title = format!("core {core}: cycles of {}", Timeline::INTERVAL_CYCLES);
+            // A cause without cycles has no track.
+            let is_used = |at: &usize| causes.iter().any(|of| of[*at] > 0);
+            let used: Vec<usize> = (0..CoreCycles::NAMES.len()).filter(is_used).collect();
+            for (interval, of) in (0..).zip(causes) {
+                let value = |&at: &usize| (CoreCycles::NAMES[at].to_owned(), of[at].into());
+                let values: Map<String, Value> = used.iter().map(value).collect();
+                let cycle = interval * Timeline::INTERVAL_CYCLES;
+                events.push(counter(process, &title, cycle, values.into()));
+            }
+        }
+    }
+    file(&events)
+}
+
+fn file(events: &[Value]) -> serde_json::Result<String> {
     let events: Vec<String> = (events.iter())
         .map(serde_json::to_string)
         .collect::<Result<_, _>>()?;
@@ -60,8 +126,8 @@ fn name(kind: &str, process: u32, thread: u32, name: &str) -> Value {
     json!({"ph": "M", "name": kind, "pid": process, "tid": thread, "args": {"name": name}})
 }
 
-fn counter(process: u32, name: &str, cycle: u64, (series, value): (&str, f64)) -> Value {
-    json!({"ph": "C", "name": name, "pid": process, "ts": microseconds(cycle), "args": {series: value}})
+fn counter(process: u32, name: &str, cycle: u64, series: Value) -> Value {
+    json!({"ph": "C", "name": name, "pid": process, "ts": microseconds(cycle), "args": series})
 }
 
 fn utilization_pct(item: &TimelineItem) -> f64 {
@@ -72,26 +138,25 @@ fn utilization_pct(item: &TimelineItem) -> f64 {
     100.0 * item.useful_cycles as f64 / cycles as f64
 }
 
-fn slice(item: &TimelineItem, passes: &[Pass]) -> Value {
-    let titles: Vec<String> = (item.tiles.iter()).map(|at| title(at, passes)).collect();
+fn slice(name: &str, [process, thread]: [u32; 2], [start, end]: [u64; 2], args: Value) -> Value {
     json!({
         "ph": "X",
-        "name": titles.join(" + "),
-        "pid": CORES,
-        "tid": item.core,
-        "ts": microseconds(item.start_cycle),
-        "dur": microseconds(item.end_cycle - item.start_cycle),
-        "args": {
-            "start_cycle": item.start_cycle,
-            "end_cycle": item.end_cycle,
-            "useful_cycles": item.useful_cycles,
-            "wasted_cycles": item.wasted_cycles,
-        },
+        "name": name,
+        "pid": process,
+        "tid": thread,
+        "ts": microseconds(start),
+        "dur": microseconds(end - start),
+        "args": args,
     })
 }
 
+fn titles(tiles: impl Iterator<Item = TileAt>, passes: &[Pass]) -> String {
+    let titles: Vec<String> = tiles.map(|at| title(at, passes)).collect();
+    titles.join(" + ")
+}
+
 /// `frame 0 left 3,4`: frame, eye, column and row.
-fn title(at: &TileAt, passes: &[Pass]) -> String {
+fn title(at: TileAt, passes: &[Pass]) -> String {
     let Some(pass) = passes.get(at.pass as usize) else {
         return format!("pass {} tile {}", at.pass, at.tile);
     };

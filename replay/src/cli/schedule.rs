@@ -2,14 +2,14 @@
 
 use super::ConfigArgs;
 use super::choice::choice;
-use super::outputs::Outputs;
+use super::outputs::PageOutputs;
 use super::subjects::Traces;
-use crate::files;
+use crate::files::{self, write_atomically};
 use anyhow::{Context, Result, bail, ensure};
 use frame::schedulers::{Scheduler, order_of};
 use frame::{DramModel, FrameTime, Machine, Point, Settings};
 use report::schedule::{INSTRUCTIONS, ScheduleReport, ScheduleRow};
-use shell::Progress;
+use shell::{Output, Progress};
 use sim::config::{Mode, RunConfig};
 use sim::order::frames;
 use std::path::PathBuf;
@@ -22,6 +22,7 @@ use studies::experiment::frame_count;
   replay schedule atrium.textrace --preset mali-g710
   replay schedule *.textrace --preset adreno-740 --schedulers z2-sta,hot-cold,pair-pressure --json
   replay schedule head.textrace --bandwidth 1,2,4,8,16 --csv frame-time.csv
+  replay schedule head.textrace --schedulers z2-sta --html bars.html --timeline head.perfetto.json
 docs/models/frame-time.md states the machine, its parameters and the schedulers.")]
 pub struct Args {
     /// Texture traces
@@ -70,7 +71,10 @@ pub struct Args {
     #[arg(long, value_name = "NS", hide_short_help = true)]
     dram_ns: Option<f64>,
     #[command(flatten)]
-    outputs: Outputs,
+    outputs: PageOutputs,
+    /// Also write which tiles each core holds over time, and its cycles by cause, for ui.perfetto.dev
+    #[arg(long, value_name = "FILE")]
+    timeline: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -157,6 +161,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if bandwidths.is_empty() {
         bandwidths.push(None);
     }
+    ensure!(
+        args.timeline.is_none() || (args.traces.len() == 1 && bandwidths.len() == 1),
+        "--timeline: expected one trace and one bandwidth, found {} and {}",
+        args.traces.len(),
+        bandwidths.len()
+    );
     let mut points = Vec::new();
     for &bandwidth_gb_s in &bandwidths {
         for &scheduler in &schedulers {
@@ -171,12 +181,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 points.push(Point {
                     scheduler,
                     settings,
+                    records: args.timeline.is_some() && factor == 1.0,
                 });
             }
         }
     }
     let inputs = args.traces.iter().map(PathBuf::as_path);
-    let outputs = args.outputs.list::<ScheduleReport>()?;
+    let mut outputs = args.outputs.list::<ScheduleReport>()?;
+    let timeline = args.timeline.iter();
+    outputs.extend(timeline.map(|path| Output::text("--timeline", path)));
     let prints = files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
     let traces = Traces::open(&args.traces)?;
     let subjects = traces.subjects();
@@ -200,6 +213,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             pass.size_px.map(|size| size.div_ceil(config.tile_px))
         });
         let of_points: Vec<&[FrameTime]> = times.chunks(INSTRUCTIONS.len()).collect();
+        if let Some(file) = &args.timeline {
+            let named = schedulers.iter().zip(&of_points);
+            let named: Vec<_> = named.map(|(by, of)| (by.name(), &of[0])).collect();
+            let text = report::timeline::frames_json(&named, passes)?;
+            write_atomically(file, text.as_bytes())?;
+        }
         for (of_bandwidth, &bandwidth) in of_points.chunks(schedulers.len()).zip(&bandwidths) {
             for (&of, &scheduler) in of_bandwidth.iter().zip(&schedulers) {
                 rows.push(ScheduleRow::new(
@@ -220,7 +239,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         config,
         settings,
     };
-    args.outputs.write(&report, prints)?;
+    args.outputs.write(&report, prints, || report.page())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -20,9 +20,19 @@ fn times(
     config: &RunConfig,
     settings: Settings,
 ) -> Vec<(Scheduler, FrameTime)> {
+    with_timelines(trace, config, settings, false)
+}
+
+fn with_timelines(
+    trace: &MemoryTrace,
+    config: &RunConfig,
+    settings: Settings,
+    records: bool,
+) -> Vec<(Scheduler, FrameTime)> {
     let point = |scheduler| Point {
         scheduler,
         settings,
+        records,
     };
     let points: Vec<Point> = Scheduler::all().map(point).collect();
     let times = replay(trace, config, &points, &|_| {}).unwrap();
@@ -130,6 +140,58 @@ fn results_do_not_depend_on_the_number_of_threads() {
     );
 }
 
+/// Each cycle of a core has one cause, a core without a tile has no work, and a tile is in one span of each of its cores.
+#[test]
+fn a_timeline_accounts_for_every_cycle_and_tile() {
+    let trace = different_frames();
+    let config = RunConfig {
+        cores: 3,
+        ..RunConfig::default()
+    };
+    let plain = times(&trace, &config, Settings::default());
+    let recorded = with_timelines(&trace, &config, Settings::default(), true);
+    for ((scheduler, mut time), (_, plain)) in recorded.into_iter().zip(plain) {
+        let name = scheduler.name();
+        let timeline = time.timeline.take().unwrap();
+        assert_eq!(time, plain, "{name}");
+        let all: u64 = time.frames.iter().map(|(cycles, _)| cycles).sum();
+        let of_cause = |causes: &[[u16; 9]], at: usize| -> u64 {
+            causes.iter().map(|of| u64::from(of[at])).sum()
+        };
+        let mut no_work = 0;
+        for (core, causes) in timeline.causes.iter().enumerate() {
+            let full = &causes[..(all / 1024) as usize];
+            assert!(full.iter().all(|of| of.iter().sum::<u16>() == 1024));
+            let spans = timeline.spans.iter().filter(|span| span.core == core);
+            let mut spans: Vec<&TileSpan> = spans.collect();
+            spans.sort_by_key(|span| span.cycles);
+            let (mut held, mut until, mut free) = (0, 0, [0; 8]);
+            for span in spans {
+                let [start, end] = span.cycles;
+                assert!(free[span.slot] <= start, "{name} {span:?}");
+                free[span.slot] = end;
+                held += end.max(until) - start.max(until);
+                until = until.max(end);
+            }
+            assert_eq!(held, all - of_cause(causes, 2), "{name}, core {core}");
+            no_work += all - held;
+        }
+        assert_eq!(no_work, sum(&time, |of| of.cycles.no_work), "{name}");
+        for at in 0..CoreCycles::NAMES.len() {
+            let of_cores: u64 = timeline.causes.iter().map(|of| of_cause(of, at)).sum();
+            assert_eq!(sum(&time, |of| of.cycles.list()[at]), of_cores, "{name}");
+        }
+        let mut tiles = std::collections::BTreeMap::new();
+        for tile in timeline.spans.iter().flat_map(|span| &span.tiles) {
+            *tiles.entry(*tile).or_insert(0) += 1;
+        }
+        let cores = if name.starts_with("quads") { 3 } else { 1 };
+        let [skipped, of_trace] = time.skipped_tiles;
+        assert_eq!(tiles.len() as u64, of_trace - skipped, "{name}");
+        assert!(tiles.values().all(|spans| *spans == cores), "{name}");
+    }
+}
+
 #[test]
 fn more_instructions_and_less_bandwidth_take_longer() {
     let (trace, config) = (trace(), RunConfig::default());
@@ -137,6 +199,7 @@ fn more_instructions_and_less_bandwidth_take_longer() {
         let point = Point {
             scheduler: named("z2-sta"),
             settings,
+            records: false,
         };
         Figures::of(&replay(&trace, &config, &[point], &|_| {}).unwrap()[0]).ms()
     };
