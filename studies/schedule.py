@@ -1,4 +1,4 @@
-"""Frame time by scheduler on three machines, and against the bandwidth of DRAM: two frames of a head's path of four scenes."""
+"""Frame time by scheduler on three machines, and against the bandwidth of DRAM, warps and FIFO depth: two frames of a head's path of four scenes."""
 
 import math
 
@@ -11,6 +11,9 @@ MACHINES = {
 }
 BANDWIDTHS = "1,2,4,8,16,64"
 SCHEDULERS = ["z2-lrta", "z2-sta", "hot-cold", "pair-pressure"]
+WARPS_SCENES = ["jungle", "crytek-sponza", "stk-cocoa-temple"]
+WARPS, FIFO_QUADS = (4, 8, 32), (4, 16, 64)
+WARPS_SCHEDULERS = ["boustro", "z2-lrta", "z2-sta", "pair-pressure"]
 CAPTURE = "tracegen raster SCENE --size 480x540 --path head --frames 2"
 # Published in mono, each over its own baseline: (paper, our scheduler, our baseline, speed).
 PAPERS = [
@@ -24,6 +27,28 @@ PAPERS = [
 
 def mean(ratios):
     return 100 * (math.exp(sum(map(math.log, ratios)) / len(ratios)) - 1)
+
+
+def spread(row):
+    return f"{float(row['faster_pct']):.1f} [{float(row['faster_pct_low']):.1f} to {float(row['faster_pct_high']):.1f}]"
+
+
+def against_warps(study, traces):
+    """Frame time against warps in flight and FIFO depth."""
+    machine = MACHINES["Z2 paper's caches, 4 GB/s"]
+    flags, table = f"{machine} --schedulers {','.join(WARPS_SCHEDULERS)}", []
+    for scene in study.present(WARPS_SCENES):
+        for warps in WARPS:
+            for fifo in FIFO_QUADS:
+                rows = study.csv("schedule", traces[scene], flags, f"--warps {warps} --fifo-quads {fifo}")
+                by = {row["scheduler"]: row for row in rows}
+                first = by["first-idle"]
+                waits = sum(float(first[key]) for key in ("mshr_pct", "dram_pct", "l2_pct"))
+                table.append([scene, warps, fifo, f"{float(first['ms']):.2f}", f"{waits:.0f}", *(spread(by[name]) for name in WARPS_SCHEDULERS)])
+        study.say(f"{scene}: warps and FIFO depth")
+    study.write(
+        "schedule-warps", f"{CAPTURE}, replay schedule TRACE {flags} --warps {' | '.join(map(str, WARPS))} --fifo-quads {' | '.join(map(str, FIFO_QUADS))}",
+        f"scene | warps | FIFO, quads | first-idle, ms | first-idle: waits for lines % | {' | '.join(f'{name}, % faster' for name in WARPS_SCHEDULERS)}", table)
 
 
 def run(study):
@@ -56,11 +81,11 @@ def run(study):
         by = {(row["bandwidth_gb_s"], row["scheduler"]): row for row in rows}
         for bandwidth in BANDWIDTHS.split(","):
             of = lambda scheduler: by[bandwidth, scheduler]
-            spread = lambda row: f"{float(row['faster_pct']):.1f} [{float(row['faster_pct_low']):.1f} to {float(row['faster_pct_high']):.1f}]"
             first = of("first-idle")
             bytes_all, bytes_sta = ([float(of(name)[key]) for key in ("read_mb", "written_mb")] for name in ("first-idle", "z2-sta"))
             bandwidths.append([scene, bandwidth, f"{float(first['ms']):.2f}", f"{float(first['bound_ms']):.2f}", *(spread(of(name)) for name in SCHEDULERS),
                                f"{100 * (1 - sum(bytes_sta) / sum(bytes_all)):.1f}"])
+    against_warps(study, traces)
     study.drop(*traces.values())
     study.write(
         "schedule", f"{CAPTURE}, replay schedule TRACE {' | '.join(MACHINES.values())}",
