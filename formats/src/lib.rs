@@ -34,6 +34,7 @@ pub mod raytrace;
 mod records;
 #[cfg(feature = "testing")]
 pub mod schemas;
+mod sums;
 pub mod technique_study;
 pub mod text;
 pub mod textrace;

@@ -45,6 +45,12 @@ impl Random {
     }
 }
 
+/// A source of numbers as of [`Random::unit_f32`].
+pub fn units(seed: u64) -> impl FnMut() -> f32 {
+    let mut random = Random(seed);
+    move || random.unit_f32()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

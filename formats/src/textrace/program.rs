@@ -74,10 +74,7 @@ impl UnrecordedReads {
 
     /// Adds the counts of further commands.
     pub fn add(&mut self, other: &Self) {
-        self.commands += other.commands;
-        self.indirect += other.indirect;
-        self.invocations += other.invocations;
-        self.reads += other.reads;
+        crate::add_fields!(self, other, commands, indirect, invocations, reads);
     }
 }
 

@@ -60,12 +60,16 @@ impl SampleErrors {
     }
 
     fn merge(&mut self, other: &Self) {
-        self.samples += other.samples;
-        self.lod_sum += other.lod_sum;
+        formats::add_fields!(
+            self,
+            other,
+            samples,
+            lod_sum,
+            levels_differ,
+            other_levels,
+            other_texels
+        );
         self.lod_max = self.lod_max.max(other.lod_max);
-        self.levels_differ += other.levels_differ;
-        self.other_levels += other.other_levels;
-        self.other_texels += other.other_texels;
         for (sum, count) in self.causes.iter_mut().zip(&other.causes) {
             *sum += count;
         }
@@ -168,13 +172,22 @@ impl Agreement {
 
     /// Adds the counts of another tile or pass.
     pub fn merge(&mut self, other: &Self) {
-        self.both += other.both;
+        formats::add_fields!(
+            self,
+            other,
+            both,
+            recorded_twice,
+            differences_unexplained,
+            groups_missing,
+            groups_unexpected,
+            not_finite,
+            shadow_lookups
+        );
         for (sum, side) in self.only.iter_mut().zip(&other.only) {
             for (sum, count) in sum.iter_mut().zip(side) {
                 *sum += count;
             }
         }
-        self.recorded_twice += other.recorded_twice;
         self.uv_errors_texels
             .0
             .extend_from_slice(&other.uv_errors_texels.0);
@@ -182,11 +195,6 @@ impl Agreement {
             *sum += count;
         }
         self.means.merge(&other.means);
-        self.differences_unexplained += other.differences_unexplained;
-        self.groups_missing += other.groups_missing;
-        self.groups_unexpected += other.groups_unexpected;
-        self.not_finite += other.not_finite;
-        self.shadow_lookups += other.shadow_lookups;
         self.lookups.merge(&other.lookups);
         self.capture.merge(&other.capture);
         self.specification.merge(&other.specification);

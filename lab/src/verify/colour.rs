@@ -58,14 +58,18 @@ impl ColourErrors {
 
     /// Adds the differences of another tile or pass.
     pub fn merge(&mut self, other: &Self) {
-        self.fragments += other.fragments;
-        self.unrecorded += other.unrecorded;
-        self.within_as_light += other.within_as_light;
-        self.within_as_encoded += other.within_as_encoded;
-        self.by_decoding += other.by_decoding;
-        self.by_srgb += other.by_srgb;
-        self.by_coordinates += other.by_coordinates;
-        self.sum += other.sum;
+        formats::add_fields!(
+            self,
+            other,
+            fragments,
+            unrecorded,
+            within_as_light,
+            within_as_encoded,
+            by_decoding,
+            by_srgb,
+            by_coordinates,
+            sum
+        );
         self.max = self.max.max(other.max);
         self.max_as_driver = self.max_as_driver.max(other.max_as_driver);
     }

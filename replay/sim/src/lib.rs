@@ -38,4 +38,5 @@ pub mod tmu;
 
 pub use config::RunConfig;
 pub use engine::{ReplayError, replay};
+pub use formats::add_fields;
 pub use result::RunResult;

@@ -1,12 +1,4 @@
-//! Sums of counters, field by field, and what a model conserves.
-
-/// Adds the named fields of one value to those of another.
-#[macro_export]
-macro_rules! add_fields {
-    ($sum:expr, $other:expr, $($field:ident),+ $(,)?) => {
-        $($sum.$field += $other.$field;)+
-    };
-}
+//! What a model conserves.
 
 /// A sum that a model did not conserve: a defect of the model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

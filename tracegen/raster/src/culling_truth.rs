@@ -19,8 +19,7 @@ pub struct Wrong {
 
 impl AddAssign for Wrong {
     fn add_assign(&mut self, other: Self) {
-        self.negatives += other.negatives;
-        self.positives += other.positives;
+        formats::add_fields!(self, other, negatives, positives);
     }
 }
 

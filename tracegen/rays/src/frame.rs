@@ -51,9 +51,7 @@ impl FrameStats {
         for (sum, n) in self.rays.iter_mut().zip(other.rays) {
             *sum += n;
         }
-        self.steps += other.steps;
-        self.triangle_tests += other.triangle_tests;
-        self.hits += other.hits;
+        formats::add_fields!(self, other, steps, triangle_tests, hits);
     }
 
     /// Rays of all kinds.

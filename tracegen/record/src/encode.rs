@@ -23,9 +23,7 @@ pub struct Recorded {
 
 impl AddAssign for Recorded {
     fn add_assign(&mut self, other: Self) {
-        self.counts += other.counts;
-        self.regions += other.regions;
-        self.sorting += other.sorting;
+        formats::add_fields!(self, other, counts, regions, sorting);
     }
 }
 

@@ -30,13 +30,17 @@ pub struct CaptureCounts {
 
 impl AddAssign for CaptureCounts {
     fn add_assign(&mut self, other: Self) {
-        self.quads += other.quads;
-        self.fragments += other.fragments;
-        self.records += other.records;
-        self.masked_lanes_killed += other.masked_lanes_killed;
-        self.not_finite += other.not_finite;
-        self.tile_bytes += other.tile_bytes;
-        self.empty_tiles += other.empty_tiles;
+        formats::add_fields!(
+            self,
+            other,
+            quads,
+            fragments,
+            records,
+            masked_lanes_killed,
+            not_finite,
+            tile_bytes,
+            empty_tiles
+        );
     }
 }
 

@@ -75,12 +75,16 @@ impl Counted {
 
 impl AddAssign for Counted {
     fn add_assign(&mut self, other: Self) {
-        self.fragments += other.fragments;
-        self.vertices += other.vertices;
-        self.texture_bytes += other.texture_bytes;
-        self.vertex_bytes += other.vertex_bytes;
-        self.picture_bytes += other.picture_bytes;
-        self.uploaded_bytes += other.uploaded_bytes;
+        formats::add_fields!(
+            self,
+            other,
+            fragments,
+            vertices,
+            texture_bytes,
+            vertex_bytes,
+            picture_bytes,
+            uploaded_bytes
+        );
     }
 }
 

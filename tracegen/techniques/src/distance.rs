@@ -79,7 +79,7 @@ impl DistanceCull {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::random::Random;
+    use formats::random::units;
     use formats::view::{EyeView, FovTangents};
 
     fn head() -> Head {
@@ -127,8 +127,7 @@ mod tests {
 
     #[test]
     fn culled_boxes_are_smaller_than_the_limit_in_the_picture() {
-        let mut source = Random(5);
-        let mut random = || source.unit_f32();
+        let mut random = units(5);
         let (mut out, mut kept) = (0, 0);
         for _ in 0..4000 {
             let center = Vec3::new(random() - 0.5, random() - 0.5, -1.0) * (1.0 + 60.0 * random());

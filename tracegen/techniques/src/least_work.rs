@@ -241,7 +241,7 @@ fn areas(object: &Object) -> (f64, [f64; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::random::Random;
+    use formats::random::units;
 
     const PIXELS: Pixels = Pixels {
         eye: 10_000.0,
@@ -291,8 +291,7 @@ mod tests {
 
     #[test]
     fn no_allowed_split_on_a_fine_grid_costs_less() {
-        let mut source = Random(7);
-        let mut random = || source.unit_f32();
+        let mut random = units(7);
         let (mut with, mut without) = (0, 0);
         for _ in 0..300 {
             let count = 1 + (random() * 30.0) as usize;

@@ -98,7 +98,7 @@ fn spread(vertices: [DVec3; 3], least_w: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::random::Random;
+    use formats::random::units;
     use glam::camera::rh::{
         proj::directx::{orthographic, perspective},
         view::look_at_mat4,
@@ -131,8 +131,7 @@ mod tests {
 
     #[test]
     fn the_bound_is_below_the_derivatives_of_random_triangles_and_often_close() {
-        let mut source = Random(11);
-        let mut random = || source.unit_f32();
+        let mut random = units(11);
         let look = look_at_mat4(Vec3::new(0.3, 1.0, 0.0), Vec3::new(0.0, 0.8, -1.0), Vec3::Y);
         let views = [
             (perspective(1.5, 0.9, 0.1, 50.0), 0.1),

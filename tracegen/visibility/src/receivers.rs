@@ -207,7 +207,7 @@ impl Receivers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::random::Random;
+    use formats::random::units;
     use glam::camera::rh::{
         proj::directx::{orthographic, perspective},
         view::look_at_mat4,
@@ -283,8 +283,7 @@ mod tests {
 
     #[test]
     fn every_visible_point_is_looked_up_in_a_found_volume() {
-        let mut source = Random(3);
-        let mut random = || source.unit_f32();
+        let mut random = units(3);
         let (mut looked_up, mut unused) = (0, 0);
         for _ in 0..3000 {
             let volumes = volumes(&[

@@ -62,11 +62,8 @@ fn read(
     options: &SamplingOptions,
 ) -> Vec<Footprint> {
     let sample = Sample {
-        texture: 0,
-        sampler: 0,
-        layer: 0,
-        offset: [0; 2],
         level,
+        ..Sample::default()
     };
     let mut found = Vec::new();
     let extent = [SIZE; 2];

@@ -298,13 +298,17 @@ impl RayCounts {
     }
 
     fn add(mut self, other: Self) -> Self {
-        self.samples += other.samples;
-        self.hits += other.hits;
+        sim::add_fields!(
+            self,
+            other,
+            samples,
+            hits,
+            steps,
+            triangle_tests,
+            alpha_tests,
+            visits
+        );
         self.rays = std::array::from_fn(|kind| self.rays[kind] + other.rays[kind]);
-        self.steps += other.steps;
-        self.triangle_tests += other.triangle_tests;
-        self.alpha_tests += other.alpha_tests;
-        self.visits += other.visits;
         self
     }
 }

@@ -147,7 +147,7 @@ impl PreparedCone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::random::Random;
+    use formats::random::units;
 
     /// A cone along -z with its apex at the origin.
     fn cone(tangent: f64) -> Cone {
@@ -182,8 +182,7 @@ mod tests {
     /// sphere is, and kept if the largest sphere inside it is.
     #[test]
     fn boxes_are_classified_between_their_outer_and_inner_spheres() {
-        let mut source = Random(3);
-        let mut random = || source.unit_f32();
+        let mut random = units(3);
         let (mut lost, mut kept) = (0, 0);
         for _ in 0..20_000 {
             let tangent = 0.1 + 2.0 * f64::from(random());
@@ -209,8 +208,7 @@ mod tests {
 
     #[test]
     fn boxes_with_points_inside_and_outside_are_classified_correctly() {
-        let mut source = Random(9);
-        let mut random = || source.unit_f32();
+        let mut random = units(9);
         let mut seen = [0; 2];
         for _ in 0..20_000 {
             let tangent = 0.05 + 3.0 * f64::from(random());
