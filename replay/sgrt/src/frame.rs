@@ -30,12 +30,7 @@ pub trait RaySource: Sync {
     ///
     /// # Errors
     /// As [`Self::tile`].
-    fn tile_with_geometry(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), TileError> {
+    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         self.tile(eye, index, tile)
     }
 
@@ -57,12 +52,7 @@ impl RaySource for Raytrace {
         Ok(self.decode_tile(eye, index, tile)?)
     }
 
-    fn tile_with_geometry(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), TileError> {
+    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         Ok(self.decode_tile_with_geometry(eye, index, tile)?)
     }
 

@@ -23,13 +23,8 @@ impl RaySource for OfKinds<'_> {
         Ok(())
     }
 
-    fn tile_with_geometry(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), TileError> {
-        self.source.tile_with_geometry(eye, index, tile)?;
+    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
+        self.source.full_tile(eye, index, tile)?;
         self.keep(tile);
         Ok(())
     }

@@ -255,15 +255,7 @@ fn timing(
 fn prefetches(p: &PrefetchCounts, l1_misses: u64) -> PrefetchTiming {
     let used = p.useful + p.late;
     PrefetchTiming {
-        requested: p.requested,
-        held: p.held,
-        dropped: p.dropped,
-        issued: p.issued,
-        useful: p.useful,
-        late: p.late,
-        useless: p.useless,
-        dram_lines: p.dram_lines,
-        of_other_eye: p.of_other_eye,
+        counts: *p,
         accuracy_pct: pct(used as f64, p.issued as f64),
         covered_pct: pct(used as f64, (used + l1_misses) as f64),
     }

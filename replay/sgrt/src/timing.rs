@@ -1,5 +1,6 @@
 //! The two models of the units' time, and what the cycle-level one reports.
 
+use super::cycles::PrefetchCounts;
 use serde::{Deserialize, Serialize};
 
 sim::choices! { Timing = "The model of the units' time.", default ClosedForm:
@@ -84,24 +85,9 @@ pub struct FrameTiming {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct PrefetchTiming {
-    /// All of them: held, dropped and issued ones.
-    pub requested: u64,
-    /// In the L1 or in flight already.
-    pub held: u64,
-    /// Given up for want of an MSHR.
-    pub dropped: u64,
-    /// Fetched into an L1: useful, late and useless ones.
-    pub issued: u64,
-    /// Requested by a ray after their arrival.
-    pub useful: u64,
-    /// Requested by a ray before their arrival.
-    pub late: u64,
-    /// Requested by no ray before their eviction or the end.
-    pub useless: u64,
-    /// Issued ones that were read from DRAM.
-    pub dram_lines: u64,
-    /// Held ones and ones found in the L2 that the other eye had fetched last.
-    pub of_other_eye: u64,
+    /// Their numbers.
+    #[serde(flatten)]
+    pub counts: PrefetchCounts,
     /// Share of issued lines that a ray requested.
     pub accuracy_pct: f64,
     /// Share of these lines in them and the remaining misses of the L1 caches.

@@ -4,7 +4,8 @@ use super::Entry;
 use super::tables::scene_name;
 use crate::columns::{Column, Show};
 use crate::table::Table;
-use sgrt::timing::{FrameTiming, PrefetchTiming};
+use sgrt::cycles::PrefetchCounts;
+use sgrt::timing::FrameTiming;
 
 /// Title of the table.
 pub const TITLE: &str = "Units cycle by cycle, and the closed form";
@@ -46,8 +47,8 @@ fn runs(entries: &[Entry]) -> Vec<UnitsRow<'_>> {
 #[rustfmt::skip]
 pub fn prefetches(entries: &[Entry]) -> Option<Table> {
     let of = |r: &UnitsRow| r.timing.prefetch.unwrap_or_default();
-    let lines = |key, name, value: fn(&PrefetchTiming) -> u64| {
-        Column::new(key, name, "", Show::Whole, move |r: &UnitsRow| value(&of(r)))
+    let lines = |key, name, value: fn(&PrefetchCounts) -> u64| {
+        Column::new(key, name, "", Show::Whole, move |r: &UnitsRow| value(&of(r).counts))
     };
     let columns = [
         Column::text("scene", "scene", |r: &UnitsRow| r.scene.clone()),

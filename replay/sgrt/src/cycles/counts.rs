@@ -1,5 +1,6 @@
 //! Counters of the simulation, and the conservation of rays and requests.
 
+use serde::{Deserialize, Serialize};
 use sim::sums::{Unbalanced, check_balance};
 
 /// Look-ups of cache lines by result.
@@ -54,23 +55,24 @@ impl UnitCycles {
 }
 
 /// Lines that a prefetcher requested.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct PrefetchCounts {
-    /// All of them.
+    /// All of them: held, dropped and issued ones.
     pub requested: u64,
-    /// Resident or in flight already.
+    /// In the L1 or in flight already.
     pub held: u64,
-    /// Dropped because no MSHR was free.
+    /// Given up for want of an MSHR.
     pub dropped: u64,
-    /// Fetched into an L1.
+    /// Fetched into an L1: useful, late and useless ones.
     pub issued: u64,
-    /// Of the fetched ones, those that a ray requested after their arrival.
+    /// Requested by a ray after their arrival.
     pub useful: u64,
-    /// Those that a ray requested before their arrival.
+    /// Requested by a ray before their arrival.
     pub late: u64,
-    /// Those that no ray requested before their eviction or the end.
+    /// Requested by no ray before their eviction or the end.
     pub useless: u64,
-    /// Of the fetched ones, those that were not in the L2.
+    /// Issued ones that were read from DRAM.
     pub dram_lines: u64,
     /// Held ones and ones found in the L2 that the other eye had fetched last.
     pub of_other_eye: u64,
