@@ -1,9 +1,7 @@
 //! `replay calibrate`: chooses settings on some scenes and evaluates them on others, against the Z2 paper.
 
-use super::ConfigArgs;
-use super::outputs::Outputs;
+use super::outputs::ReplayArgs;
 use super::subjects::{Traces, replayed};
-use crate::files::check_outputs;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use report::calibration::CalibrationReport;
 use sim::config::Mode;
@@ -46,11 +44,7 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    outputs: Outputs,
-    #[command(flatten)]
-    threads: shell::Threads,
-    #[command(flatten)]
-    machine: ConfigArgs,
+    replay: ReplayArgs,
 }
 
 /// Runs the subcommand.
@@ -58,9 +52,9 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an invalid configuration, or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let preset = args.machine.preset().unwrap_or(Preset::Z2_PAPER);
+    let preset = args.replay.machine.preset().unwrap_or(Preset::Z2_PAPER);
     let usual = sim::config::RunConfig::default();
-    let base = args.machine.resolve_over(preset.over(usual))?;
+    let base = args.replay.machine.resolve_over(preset.over(usual))?;
     ensure!(
         base.mode != Mode::Functional || args.objective != Objective::Surface,
         "--objective surface: expected a mode with a texture unit, found functional; try --objective table"
@@ -89,10 +83,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     });
     let axes: Vec<Axis> = tries.into_iter().chain(table).collect();
     let plan = Plan::cross(base, &axes, &[])?;
-    let inputs = args.traces.iter().map(PathBuf::as_path);
-    let inputs = inputs.into_iter().chain(args.machine.file());
-    let prints = check_outputs(&args.outputs.list::<CalibrationReport>()?, inputs)?;
-    args.threads.start()?;
+    let prints = args.replay.check::<CalibrationReport>(&args.traces)?;
+    args.replay.threads.start()?;
     let traces = Traces::open(&args.traces)?;
     let subjects = traces.subjects();
     let mut scenes = match args.by_ipd {
@@ -111,7 +103,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let outcome = replayed(&plan, &subjects, store.as_ref())?;
     let trials = trials(&plan, &outcome, &scenes, args.objective);
     let report = CalibrationReport::new(base, args.objective, trials);
-    args.outputs.write(&report, prints)?;
+    args.replay.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,10 +1,8 @@
 //! `replay compare`: compares two captures of the same views, and their cache misses.
 
-use super::ConfigArgs;
 use super::order_arg::parse_orders;
-use super::outputs::Outputs;
+use super::outputs::ReplayArgs;
 use super::subjects::{Traces, replayed};
-use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
 use report::compare::{CompareReport, Replayed, Side};
 use sim::config::Order;
@@ -33,11 +31,7 @@ pub struct Args {
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
     #[command(flatten)]
-    outputs: Outputs,
-    #[command(flatten)]
-    threads: shell::Threads,
-    #[command(flatten)]
-    machine: ConfigArgs,
+    replay: ReplayArgs,
 }
 
 /// Runs the subcommand.
@@ -45,17 +39,16 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, or captures of different views or textures.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let config = args.machine.resolve()?;
+    let config = args.replay.machine.resolve()?;
     ensure!(
-        args.machine.first_of_traces() != Some("--order"),
+        args.replay.machine.first_of_traces() != Some("--order"),
         "--order: this command varies the order; use --orders"
     );
     let orders = parse_orders(&args.orders)?;
-    let inputs = [args.a.as_path(), &args.b];
-    let inputs = inputs.into_iter().chain(args.machine.file());
-    let prints = check_outputs(&args.outputs.list::<CompareReport>()?, inputs)?;
-    args.threads.start()?;
-    let traces = Traces::open(&[args.a.clone(), args.b.clone()])?;
+    let captures = [args.a.clone(), args.b.clone()];
+    let prints = args.replay.check::<CompareReport>(&captures)?;
+    args.replay.threads.start()?;
+    let traces = Traces::open(&captures)?;
     let subjects = traces.subjects();
     let [a, b] = [&subjects[0], &subjects[1]];
     let comparison = compare([a.source, b.source], &config)
@@ -83,6 +76,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         comparison: &comparison,
         replayed: replayed.collect(),
     };
-    args.outputs.write(&report, prints)?;
+    args.replay.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! Where a command writes what it found: `--json`, `--csv`, `--parquet` and `--html`.
 
-use crate::files::write_atomically;
+use super::ConfigArgs;
+use crate::files::{check_outputs, write_atomically};
 use anyhow::{Context, Result, ensure};
 use clap::Arg;
 use report::document::Document;
@@ -54,6 +55,31 @@ pub(super) struct Outputs {
     details: bool,
     #[command(flatten)]
     style: StyleArg,
+}
+
+/// What commands have in common that replay traces and print rows.
+#[derive(Debug, clap::Args)]
+pub(super) struct ReplayArgs {
+    #[command(flatten)]
+    pub outputs: Outputs,
+    #[command(flatten)]
+    pub threads: shell::Threads,
+    #[command(flatten)]
+    pub machine: ConfigArgs,
+}
+
+impl ReplayArgs {
+    /// Checks the outputs of a command on traces. Returns whether standard output is free for its result.
+    ///
+    /// # Errors
+    /// An output that cannot be written, or that would replace an input or another output.
+    pub fn check<D: Document>(&self, traces: &[PathBuf]) -> Result<bool> {
+        let inputs = traces.iter().map(PathBuf::as_path);
+        check_outputs(
+            &self.outputs.list::<D>()?,
+            inputs.chain(self.machine.file()),
+        )
+    }
 }
 
 /// The flag `--markdown`.

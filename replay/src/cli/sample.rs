@@ -2,10 +2,9 @@
 
 mod counts_file;
 
-use super::ConfigArgs;
 use super::experiment_args::{parse_caches, refuse_varied};
 use super::order_arg::parse_named;
-use super::outputs::Outputs;
+use super::outputs::ReplayArgs;
 use crate::files;
 use anyhow::{Context, Result, bail, ensure};
 use formats::container::ScratchFolder;
@@ -74,11 +73,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "command")]
     values: Option<PathBuf>,
     #[command(flatten)]
-    outputs: Outputs,
-    #[command(flatten)]
-    threads: shell::Threads,
-    #[command(flatten)]
-    machine: ConfigArgs,
+    replay: ReplayArgs,
 }
 
 fn parse_within(text: &str) -> Result<(String, Within), String> {
@@ -113,7 +108,7 @@ fn points(args: &Args) -> Result<Points> {
         mode,
         ..RunConfig::default()
     };
-    let base = args.machine.resolve_over(usual)?;
+    let base = args.replay.machine.resolve_over(usual)?;
     refuse_varied(&base, &usual)?;
     ensure!(
         args.of != Of::Cycles || base.mode == Mode::Timed,
@@ -146,7 +141,7 @@ fn points(args: &Args) -> Result<Points> {
 /// # Errors
 /// Invalid arguments, an unreadable trace, a command that fails, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.threads.start()?;
+    args.replay.threads.start()?;
     let (within, width) = &args.within;
     ensure!(
         matches!(width, Within::Points(_)) == args.of.is_share(),
@@ -163,13 +158,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let mut points = points(args)?;
     let mut outputs = match args.draws {
-        Some(_) => args.outputs.list::<TrialReport>()?,
-        None => args.outputs.list::<SampleReport>()?,
+        Some(_) => args.replay.outputs.list::<TrialReport>()?,
+        None => args.replay.outputs.list::<SampleReport>()?,
     };
     let values = args.save_values.iter();
     outputs.extend(values.map(|path| shell::Output::text("--save-values", path)));
     let inputs = args.traces.iter().chain(&args.values).map(PathBuf::as_path);
-    let prints = files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
+    let prints = files::check_outputs(&outputs, inputs.chain(args.replay.machine.file()))?;
     let report = match (args.command.split_first(), args.draws) {
         (Some((program, rest)), _) => driven(args, &mut points, &promise, program, rest)?,
         (None, draws) => {
@@ -185,14 +180,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             if let Some(draws) = draws {
                 let report = trials(args, &points, &plan, &promise, draws)?;
                 save_values(args, &points)?;
-                args.outputs.write(&report, prints)?;
+                args.replay.outputs.write(&report, prints)?;
                 return Ok(ExitCode::SUCCESS);
             }
             stepped(args, &points, &plan, &promise)
         }
     };
     save_values(args, &points)?;
-    args.outputs.write(&report, prints)?;
+    args.replay.outputs.write(&report, prints)?;
     let broken = report.capture.is_empty() && !report.rows.iter().all(|row| row.kept);
     Ok(ExitCode::from(u8::from(broken)))
 }
