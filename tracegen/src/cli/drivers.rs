@@ -4,7 +4,7 @@ use anyhow::anyhow;
 use raster::backend::CaptureBackend;
 use raster::draws::DrawList;
 use raster::error::RasterError;
-use raster::lavapipe::Lavapipe;
+use raster::lavapipe::{Lavapipe, device};
 use scene::Scene;
 use std::env;
 use std::path::PathBuf;
@@ -48,7 +48,14 @@ impl Driver {
             )
         };
         let lavapipe = || -> Result<Box<dyn CaptureBackend>, RasterError> {
-            let lavapipe = Lavapipe::new(scene, draws, textures, view_size_px, budget)?;
+            let lavapipe = Lavapipe::new(
+                device::open(None)?,
+                scene,
+                draws,
+                textures,
+                view_size_px,
+                budget,
+            )?;
             Ok(Box::new(lavapipe))
         };
         let (backend, instead_of) = match self {

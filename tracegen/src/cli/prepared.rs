@@ -42,7 +42,7 @@ pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Resu
     let scene = &world.scene;
     let uploads = prepare_textures(scene, |_| Some(0), of.cache.open()?.as_ref())?;
     let size_px = world.hmd.eye_size_px;
-    let backend = Lavapipe::on(
+    let backend = Lavapipe::new(
         gpu,
         scene,
         &world.draws,

@@ -17,7 +17,7 @@ use lab::verify::report::Report;
 use raster::backend::Texels;
 use raster::capture::CaptureJob;
 use raster::frame::Frame;
-use raster::lavapipe::Lavapipe;
+use raster::lavapipe::{Lavapipe, device};
 use record::Recorder;
 use scene::{LoadOptions, TextureSlot, TextureSlots};
 use shell::{Output, Progress, Threads, note};
@@ -137,6 +137,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let textures = TextureSet::prepare(&world.scene, |image| finest[image], cache.as_ref())?;
     let mut backend = match existing.is_none() || args.colour {
         true => Some(Lavapipe::new(
+            device::open(None)?,
             &world.scene,
             &world.draws,
             &textures,

@@ -67,7 +67,8 @@ pub(super) fn job<'a>(
 /// The driver for a scene and its draws.
 pub(super) fn driver(scene: &Scene, draws: &DrawList, size_px: [u32; 2]) -> Lavapipe {
     let set = TextureSet::compress(scene).unwrap();
-    Lavapipe::new(scene, draws, &set, size_px, BUDGET).unwrap_or_else(|e| panic!("{e}"))
+    let gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
+    Lavapipe::new(gpu, scene, draws, &set, size_px, BUDGET).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The path of a downloaded scene, or nothing and a message if it is absent.
@@ -190,7 +191,7 @@ pub(super) fn capture_skipping(
     let mut finest = Vec::new();
     let frame = job.frame_and_levels(&views, &mut finest)?;
     let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
-    let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
+    let mut backend = Lavapipe::new(device::open(None)?, scene, &draws, &set, size_px, budget)?;
     let tables = tables(&job, (&views, &frame), &set, &backend);
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));

@@ -284,7 +284,15 @@ fn check_real_scene(file: &str, camera: &str, size_px: [u32; 2], frames: &[u32])
     let draws = DrawList::new(&scene, 0).unwrap();
     // Only depth matters here, so no texels are prepared.
     let set = TextureSet::prepare(&scene, |_| None, None).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, size_px, BUDGET).unwrap();
+    let mut backend = Lavapipe::new(
+        device::open(None).unwrap(),
+        &scene,
+        &draws,
+        &set,
+        size_px,
+        BUDGET,
+    )
+    .unwrap();
     let mut measured = 0;
     for variant in VARIANTS {
         let planner = planner(&far(Split::Pixels(1.0), variant), size_px, BOTH);

@@ -143,7 +143,7 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let set = TextureSet::compress(&scene).unwrap();
     let mut gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
     gpu.no_capture = Some("what the test took away".into());
-    let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let mut backend = Lavapipe::new(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
     let planner = baseline(SIZE_PX, BOTH);
     let job = job(&scene, &draws, &planner);
     let frame = job.frame(&views(&scene, SIZE_PX)).unwrap();

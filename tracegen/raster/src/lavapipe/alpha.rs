@@ -68,7 +68,10 @@ pub fn copies(
         return Ok(BTreeMap::new());
     }
     gpu.checked("copying the alpha of textures", || {
-        let source = include_str!("../shaders/alpha_copies.wgsl");
+        let source = concat!(
+            include_str!("../shaders/whole.wgsl"),
+            include_str!("../shaders/alpha_copies.wgsl")
+        );
         let module = gpu.module("alpha", source);
         let color = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
         let layout = bindings::fragment_layout(gpu, "alpha", [(0, color)]);
@@ -144,12 +147,6 @@ mod tests {
 @group(0) @binding(1) var alpha: texture_2d<f32>;
 @group(0) @binding(2) var linear: sampler;
 
-@vertex
-fn vertex_whole(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
-    let ndc = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
-    return vec4(ndc, 0.0, 1.0);
-}
-
 @fragment
 fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f32> {
     let at = position.xy / 256.0;
@@ -181,7 +178,10 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
     ) -> Vec<[f32; 2]> {
         let textures = [texture];
         let copies = copies(gpu, &BTreeSet::from([0]), &textures).unwrap();
-        let module = gpu.module("test", BOTH);
+        let module = gpu.module(
+            "test",
+            format!("{}{BOTH}", include_str!("../shaders/whole.wgsl")),
+        );
         let view = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
         let filters = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let layout = bindings::fragment_layout(gpu, "both", [(0, view), (1, view), (2, filters)]);

@@ -40,7 +40,8 @@ impl Composer {
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader of the layers", || {
             let source = format!(
-                "const TILE_SIZE: i32 = {TILE_SIZE_PX};\n{}",
+                "const TILE_SIZE: i32 = {TILE_SIZE_PX};\n{}{}",
+                include_str!("../shaders/whole.wgsl"),
                 include_str!("../shaders/layers.wgsl")
             );
             let module = gpu.module("layers", source);

@@ -75,34 +75,12 @@ impl Lavapipe {
         self.gpu.is_software
     }
 
-    /// Opens lavapipe and uploads the scene, see [`Self::on`].
-    ///
-    /// # Errors
-    /// No driver, unsupported features, sizes beyond its limits.
-    pub fn new(
-        scene: &Scene,
-        draws: &DrawList,
-        textures: &TextureSet,
-        view_size_px: [u32; 2],
-        record_budget_bytes: u64,
-    ) -> Result<Self, RasterError> {
-        let gpu = device::open(None)?;
-        Self::on(
-            gpu,
-            scene,
-            draws,
-            textures,
-            view_size_px,
-            record_budget_bytes,
-        )
-    }
-
     /// Uploads the scene to an opened device. A region is split if its raw records exceed
     /// `record_budget_bytes`, capped by the driver's limit of 128 MiB.
     ///
     /// # Errors
     /// Driver errors, sizes beyond the device's limits.
-    pub fn on(
+    pub fn new(
         gpu: Gpu,
         scene: &Scene,
         draws: &DrawList,

@@ -19,13 +19,6 @@ struct Part {
 // 1 where the part fills a tile of the picture.
 @group(1) @binding(2) var tiles: texture_2d<u32>;
 
-// One triangle over the whole target, at the nearest depth.
-@vertex
-fn vertex_whole(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
-    let ndc = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
-    return vec4(ndc, 1.0, 1.0);
-}
-
 // Writes the nearest depth where nothing may be drawn: no draw passes its test there.
 @fragment
 fn fragment_mask(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
