@@ -13,26 +13,10 @@ from pathlib import Path
 
 import parallax_traces as plx
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from lru import LRU
+
 RUNS = 5
-
-
-class LRU:
-    """The policy of docs/use/python.md."""
-
-    def __init__(self, sets, ways):
-        self.used = [[] for _ in range(sets)]
-
-    def hit(self, set, way, line):
-        self.used[set].remove(way)
-        self.used[set].append(way)
-
-    def fill(self, set, way, line):
-        if way in self.used[set]:
-            self.used[set].remove(way)
-        self.used[set].append(way)
-
-    def victim(self, set):
-        return self.used[set][0]
 
 
 def once(call):

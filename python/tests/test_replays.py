@@ -7,28 +7,10 @@ import numpy as np
 import pandas as pd
 import parallax_traces as plx
 import pytest
+from lru import LRU
 
 SMALL = {"mode": "functional", "l1.size_bytes": "4KiB", "l2.size_bytes": "32KiB"}
 COUNTS = ["footprints", "l1_footprint_miss_pct", "l2_line_miss_pct", "external_bytes", "unique_lines"]
-
-
-class LRU:
-    """Least recently used, with a list per set."""
-
-    def __init__(self, sets, ways):
-        self.used = [[] for _ in range(sets)]
-
-    def hit(self, set, way, line):
-        self.used[set].remove(way)
-        self.used[set].append(way)
-
-    def fill(self, set, way, line):
-        if way in self.used[set]:
-            self.used[set].remove(way)
-        self.used[set].append(way)
-
-    def victim(self, set):
-        return self.used[set][0]
 
 
 def counts(frame):

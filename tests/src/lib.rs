@@ -3,6 +3,7 @@
 pub mod columns;
 pub mod exercise;
 pub mod figures;
+pub mod lru;
 pub mod repair;
 pub mod traces;
 pub mod writers;

@@ -12,6 +12,13 @@ fn damaged(folder: &Path, change: impl FnOnce(&mut Vec<u8>)) -> std::path::PathB
     path
 }
 
+/// Flags that `replay run` refuses for a golden trace.
+fn refuse_run(flags: &[&str], expected: &[&str]) {
+    let trace = root().join("traces/atrium-shadows.textrace");
+    let mut command = program("replay");
+    refuse(command.arg("run").arg(&trace).args(flags), expected);
+}
+
 #[test]
 fn a_missing_trace_is_named() {
     refuse(
@@ -57,14 +64,8 @@ fn a_text_file_is_not_a_trace() {
 
 #[test]
 fn a_cache_whose_number_of_sets_is_not_a_power_of_two_is_refused() {
-    let trace = root().join("traces/atrium-shadows.textrace");
-    refuse(
-        program("replay")
-            .arg("run")
-            .arg(&trace)
-            .args(["--l1", "9KiB"]),
-        &["L1", "power-of-two number of sets", "144"],
-    );
+    let expected = ["L1", "power-of-two number of sets", "144"];
+    refuse_run(&["--l1", "9KiB"], &expected);
 }
 
 #[test]
@@ -84,14 +85,7 @@ fn caches_that_exceed_the_memory_are_refused() {
 
 #[test]
 fn an_unknown_order_is_refused_with_the_list_of_known_orders() {
-    let trace = root().join("traces/atrium-shadows.textrace");
-    refuse(
-        program("replay")
-            .arg("run")
-            .arg(&trace)
-            .args(["--order", "zz"]),
-        &["zz", "z2-sta"],
-    );
+    refuse_run(&["--order", "zz"], &["zz", "z2-sta"]);
 }
 
 #[test]

@@ -6,6 +6,15 @@ use std::process::Command;
 
 const PROGRAMS: [&str; 2] = ["tracegen", "replay"];
 
+/// The output of `replay run` on a golden trace.
+fn run(arguments: &[&str]) -> std::process::Output {
+    let mut command = program("replay");
+    command
+        .arg("run")
+        .arg(root().join("traces/atrium.textrace"));
+    run_ok(command.args(arguments))
+}
+
 /// The subcommands in a program's help.
 fn subcommands(name: &str) -> Vec<String> {
     let help = run_ok(program(name).arg("--help")).stdout;
@@ -351,12 +360,7 @@ fn a_path_that_is_not_utf8_causes_no_panic() {
 
 #[test]
 fn the_table_of_a_run_has_the_textures_and_the_tiles_that_were_asked_for() {
-    let trace = root().join("traces/atrium.textrace");
-    let shown = |arguments: &[&str]| {
-        let mut command = program("replay");
-        let output = run_ok(command.arg("run").arg(&trace).args(arguments));
-        String::from_utf8(output.stdout).expect("text")
-    };
+    let shown = |arguments: &[&str]| String::from_utf8(run(arguments).stdout).expect("text");
     let json: serde_json::Value =
         serde_json::from_str(&shown(&["--json", "--tiles"])).expect("JSON");
     let plain = shown(&[]);
@@ -386,12 +390,7 @@ fn the_table_of_a_run_has_the_textures_and_the_tiles_that_were_asked_for() {
 
 #[test]
 fn the_warning_of_the_first_miss_model_names_what_differs_from_the_preset() {
-    let trace = root().join("traces/atrium.textrace");
-    let warned = |arguments: &[&str]| {
-        let mut command = program("replay");
-        let output = run_ok(command.arg("run").arg(&trace).args(arguments));
-        String::from_utf8(output.stderr).expect("text")
-    };
+    let warned = |arguments: &[&str]| String::from_utf8(run(arguments).stderr).expect("text");
     let preset = ["--preset", "z2-paper"];
     assert!(!warned(&preset).contains("first-miss"));
     let changed = warned(&[&preset[..], &["--loop-cycles", "20"]].concat());

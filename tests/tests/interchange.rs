@@ -2,9 +2,10 @@
 //! Independent readers must find the counts of `replay run` on the same trace.
 
 use formats::textrace::Encoding;
+use parallax_tests::lru::Lru;
 use parallax_tests::{program, refuse, root, run_ok, traces};
 use serde_json::Value;
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,22 +55,11 @@ fn run(options: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
 
-/// Misses of a set-associative LRU cache, in the simplest implementation.
+/// Misses of a set-associative LRU cache.
 fn lru_misses(addresses: &[u64], size_bytes: u64, ways: usize) -> u64 {
-    let sets = size_bytes / LINE_BYTES / ways as u64;
-    let mut cache: Vec<VecDeque<u64>> = vec![VecDeque::new(); sets as usize];
-    let mut misses = 0;
-    for line in addresses.iter().map(|a| a / LINE_BYTES) {
-        let set = &mut cache[(line % sets) as usize];
-        if let Some(at) = set.iter().position(|&tag| tag == line) {
-            set.remove(at);
-        } else {
-            misses += 1;
-            set.truncate(ways - 1);
-        }
-        set.push_front(line);
-    }
-    misses
+    let mut cache = Lru::new((size_bytes / LINE_BYTES) as usize / ways, ways);
+    let lines = addresses.iter().map(|a| a / LINE_BYTES);
+    lines.filter(|line| !cache.access(*line)).count() as u64
 }
 
 #[test]

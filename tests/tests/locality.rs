@@ -1,6 +1,7 @@
 //! Compares `replay locality` with plain caches whose input is written by `replay convert`, and tests its
 //! outputs.
 
+use parallax_tests::lru::Lru;
 use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
 use std::collections::HashSet;
@@ -26,35 +27,6 @@ fn lines() -> Vec<u64> {
     let text = String::from_utf8(output.stdout).expect("din is text");
     let line = |line: &str| u64::from_str_radix(&line[2..], 16).expect("an address") / LINE_BYTES;
     text.lines().map(line).collect()
-}
-
-/// An LRU cache: one list per set, most recently used first.
-struct Lru {
-    sets: Vec<Vec<u64>>,
-    ways: usize,
-}
-
-impl Lru {
-    fn new(sets: usize, ways: usize) -> Self {
-        Self {
-            sets: vec![Vec::new(); sets],
-            ways,
-        }
-    }
-
-    fn access(&mut self, line: u64) -> bool {
-        let set = line as usize % self.sets.len();
-        let set = &mut self.sets[set];
-        let found = set.iter().position(|&other| other == line);
-        match found {
-            Some(at) => set[..=at].rotate_right(1),
-            None => {
-                set.truncate(self.ways - 1);
-                set.insert(0, line);
-            }
-        }
-        found.is_some()
-    }
 }
 
 /// A cache, with a fully associative one of the same size and an infinite one.

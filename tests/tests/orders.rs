@@ -1,6 +1,7 @@
 //! Compares `replay orders` with plain caches that replay the output of `replay convert`, and tests searched
 //! orders in files and refusals.
 
+use parallax_tests::lru::Lru;
 use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
 use std::fs;
@@ -31,29 +32,6 @@ fn row<'a>(json: &'a Value, order: &str) -> &'a Value {
     found.unwrap_or_else(|| panic!("no row of {order}"))
 }
 
-/// An LRU cache of four ways: one list per set, most recently used first.
-struct Lru(Vec<Vec<u64>>);
-
-impl Lru {
-    fn new(bytes: u64) -> Self {
-        Self(vec![Vec::new(); (bytes / LINE_BYTES / 4) as usize])
-    }
-
-    fn access(&mut self, line: u64) -> bool {
-        let sets = self.0.len() as u64;
-        let set = &mut self.0[(line % sets) as usize];
-        let found = set.iter().position(|&other| other == line);
-        match found {
-            Some(at) => set[..=at].rotate_right(1),
-            None => {
-                set.truncate(3);
-                set.insert(0, line);
-            }
-        }
-        found.is_some()
-    }
-}
-
 /// Uses one core, and orders that differ in every part.
 #[test]
 fn bytes_equal_those_of_plain_caches_with_din_input() {
@@ -78,7 +56,7 @@ fn bytes_equal_those_of_plain_caches_with_din_input() {
                 .arg(trace()),
         );
         let text = String::from_utf8(output.stdout).expect("din is text");
-        let (mut l1, mut l2) = (Lru::new(4 << 10), Lru::new(16 << 10));
+        let (mut l1, mut l2) = (Lru::new(64, 4), Lru::new(256, 4));
         let address = |line: &str| u64::from_str_radix(&line[2..], 16).expect("an address");
         let lines = text.lines().map(|line| address(line) / LINE_BYTES);
         let misses = lines

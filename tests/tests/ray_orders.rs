@@ -1,6 +1,7 @@
 //! Compares the DRAM bytes of `replay reproject --order` with plain caches that replay the output of `replay convert`,
 //! and tests refusals of orders for rays.
 
+use parallax_tests::lru::Lru;
 use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -8,34 +9,6 @@ use std::path::{Path, PathBuf};
 const UNITS: usize = 4;
 const LINE_BYTES: u64 = 64;
 const WIDTH: usize = 88;
-
-/// An LRU cache: one list per set, most recently used first.
-struct Lru {
-    sets: Vec<Vec<u64>>,
-    ways: usize,
-}
-
-impl Lru {
-    fn new(bytes: u64, ways: usize) -> Self {
-        let sets = bytes as usize / ways / LINE_BYTES as usize;
-        Self {
-            sets: vec![Vec::new(); sets],
-            ways,
-        }
-    }
-
-    fn access(&mut self, line: u64) -> bool {
-        let at = line as usize % self.sets.len();
-        let set = &mut self.sets[at];
-        let found = set.iter().position(|&other| other == line);
-        if let Some(found) = found {
-            set.remove(found);
-        }
-        set.insert(0, line);
-        set.truncate(self.ways);
-        found.is_some()
-    }
-}
 
 /// A trace whose right and lower tiles are narrower than the others.
 fn capture(folder: &Path) -> PathBuf {
@@ -56,8 +29,8 @@ fn plain_bytes(trace: &Path, order: Option<&str>) -> u64 {
         convert.args(["--order", order]);
     }
     let text = String::from_utf8(run_ok(&mut convert).stdout).expect("text");
-    let mut l1: Vec<Lru> = (0..2 * UNITS).map(|_| Lru::new(16384, 4)).collect();
-    let mut l2 = Lru::new(131_072, 8);
+    let mut l1: Vec<Lru> = (0..2 * UNITS).map(|_| Lru::new(64, 4)).collect();
+    let mut l2 = Lru::new(256, 8);
     let mut misses = 0;
     for row in text.lines().skip(1) {
         let cells: Vec<&str> = row.split(',').collect();

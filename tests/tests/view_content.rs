@@ -4,6 +4,7 @@
 use crate::view::{digits, numbers, run, trace, view};
 use formats::Trace;
 use formats::layout::{Layout, LayoutConfig};
+use parallax_tests::lru::Lru;
 use parallax_tests::{program, run_ok};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -203,27 +204,6 @@ fn share(part: u64, all: u64) -> u64 {
     }
 }
 
-/// A four-way LRU cache as plain lists, the most recently used line last.
-struct Lru(Vec<Vec<u64>>);
-
-impl Lru {
-    fn new(bytes: u64) -> Self {
-        Self(vec![Vec::new(); (bytes / LINE_BYTES / 4) as usize])
-    }
-
-    fn hits(&mut self, line: u64) -> bool {
-        let index = (line % self.0.len() as u64) as usize;
-        let set = &mut self.0[index];
-        let hit = set.contains(&line);
-        set.retain(|of| *of != line);
-        set.push(line);
-        if set.len() > 4 {
-            set.remove(0);
-        }
-        hit
-    }
-}
-
 /// The last share of each tile in a packed list of changes.
 fn last_shares(list: &Value) -> Vec<u64> {
     let (mut out, mut step, mut now) = (Vec::new(), 0, 0);
@@ -259,13 +239,13 @@ fn the_content_of_the_l2_at_the_end_equals_that_of_plain_lru_caches() {
     for order in ["zig-zag", "hilbert"] {
         let data = view(&file, &[machine[0], machine[1], "--orders", order]);
         let all = accesses(&file, order);
-        let (mut l1, mut l2, mut misses) = (Lru::new(1 << 10), Lru::new(16 << 10), 0_u64);
+        let (mut l1, mut l2, mut misses) = (Lru::new(16, 4), Lru::new(256, 4), 0_u64);
         for of in &all {
-            misses += u64::from(!l1.hits(of.line) && !l2.hits(of.line));
+            misses += u64::from(!l1.access(of.line) && !l2.access(of.line));
         }
         let result = run(&file, &[machine[0], machine[1], "--order", order]);
         assert_eq!(result["l2"]["line_misses"], misses);
-        let there: BTreeSet<u64> = l2.0.into_iter().flatten().collect();
+        let there: BTreeSet<u64> = l2.sets.into_iter().flatten().collect();
         assert_eq!(data["l2_lines"], 1024);
 
         let eyes = lines_by(&all, |of| of.pass);

@@ -155,6 +155,24 @@ unsafe fn texture(
     }
 }
 
+/// A framebuffer with a colour texture. It stays bound.
+///
+/// # Safety
+/// The context is current.
+unsafe fn framebuffer_of(
+    gl: &glow::Context,
+    color: glow::Texture,
+) -> Result<glow::Framebuffer, String> {
+    let to = glow::COLOR_ATTACHMENT0;
+    // SAFETY: as the caller promises.
+    unsafe {
+        let framebuffer = gl.create_framebuffer()?;
+        gl.bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
+        gl.framebuffer_texture_2d(glow::FRAMEBUFFER, to, glow::TEXTURE_2D, Some(color), 0);
+        Ok(framebuffer)
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let frames: i32 = arguments.next().ok_or("FRAMES is missing")?.parse()?;
@@ -168,15 +186,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{}", gl.get_parameter_string(glow::RENDERER));
         let program = program(&gl)?;
         let target = texture(&gl, None, [width, height])?;
-        let framebuffer = gl.create_framebuffer()?;
-        gl.bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
-        gl.framebuffer_texture_2d(
-            glow::FRAMEBUFFER,
-            glow::COLOR_ATTACHMENT0,
-            glow::TEXTURE_2D,
-            Some(target),
-            0,
-        );
+        let framebuffer = framebuffer_of(&gl, target)?;
         let depth = gl.create_renderbuffer()?;
         gl.bind_renderbuffer(glow::RENDERBUFFER, Some(depth));
         gl.renderbuffer_storage(glow::RENDERBUFFER, glow::DEPTH_COMPONENT24, width, height);
@@ -187,15 +197,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             Some(depth),
         );
         let window = texture(&gl, None, [width, height])?;
-        let window_framebuffer = gl.create_framebuffer()?;
-        gl.bind_framebuffer(glow::FRAMEBUFFER, Some(window_framebuffer));
-        gl.framebuffer_texture_2d(
-            glow::FRAMEBUFFER,
-            glow::COLOR_ATTACHMENT0,
-            glow::TEXTURE_2D,
-            Some(window),
-            0,
-        );
+        let window_framebuffer = framebuffer_of(&gl, window)?;
         let color = |texel: i32| [(texel % TEXELS) as u8, (texel / TEXELS) as u8, 1, 255];
         let texels: Vec<u8> = (0..TEXELS * TEXELS).flat_map(color).collect();
         let texels = texture(&gl, Some(&texels), [TEXELS; 2])?;

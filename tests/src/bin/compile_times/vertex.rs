@@ -17,20 +17,14 @@ pub fn words(of: &Fragment) -> Result<Vec<u32>, String> {
     b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
     let (void, float, int) = (b.type_void(), b.type_float(32, None), b.type_int(32, 1));
     let vector = b.type_vector(float, 4);
-    let pointer = b.type_pointer(None, StorageClass::Input, int);
-    let index = b.variable(pointer, None, StorageClass::Input, None);
-    b.decorate(
-        index,
-        Decoration::BuiltIn,
-        [Operand::BuiltIn(BuiltIn::VertexIndex)],
-    );
-    let pointer = b.type_pointer(None, StorageClass::Output, vector);
-    let position = b.variable(pointer, None, StorageClass::Output, None);
-    b.decorate(
-        position,
-        Decoration::BuiltIn,
-        [Operand::BuiltIn(BuiltIn::Position)],
-    );
+    let mut built_in = |class, of_type, which| {
+        let pointer = b.type_pointer(None, class, of_type);
+        let variable = b.variable(pointer, None, class, None);
+        b.decorate(variable, Decoration::BuiltIn, [Operand::BuiltIn(which)]);
+        variable
+    };
+    let index = built_in(StorageClass::Input, int, BuiltIn::VertexIndex);
+    let position = built_in(StorageClass::Output, vector, BuiltIn::Position);
     let mut interface = vec![index, position];
     let mut outputs = Vec::new();
     for input in of.located(StorageClass::Input) {

@@ -11,7 +11,7 @@ use crate::render::copy;
 use crate::sets::upload;
 use crate::targets::{COLOR, Target, render_pass, targets};
 use crate::textures::{EDGE, LEVELS};
-use crate::{Options, shaders};
+use crate::{Options, wgsl};
 use ash::{Device, vk};
 use bindings::{Bindings, PUSH};
 pub use list::{FIELDS, Field};
@@ -48,7 +48,7 @@ pub fn run(options: &Options) -> Result<()> {
     let picture_bytes = 4 * u64::from(options.size_px[0]) * u64::from(options.size_px[1]);
     let readback = gpu.buffer(2 * picture_bytes, vk::BufferUsageFlags::TRANSFER_DST)?;
     for field in &options.fields {
-        let words = shaders::compile(&field.text())?;
+        let words = wgsl::compile(&field.text())?;
         let bindings = Bindings::new(&gpu, texture.handle, field)?;
         let pipeline =
             crate::pipeline::pipeline(&gpu, pass, bindings.layout, &words, options.libraries)?;

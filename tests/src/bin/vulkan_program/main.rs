@@ -26,6 +26,8 @@ mod sets;
 mod shaders;
 mod targets;
 mod textures;
+#[path = "../../wgsl.rs"]
+mod wgsl;
 
 use std::process::ExitCode;
 

@@ -2,6 +2,7 @@
 
 use crate::Stereo;
 use crate::objects::Object;
+use crate::wgsl::compile;
 
 /// Inputs and textures of every fragment shader.
 const HEAD: &str = "
@@ -72,16 +73,4 @@ pub fn compute() -> Result<Vec<u32>, String> {
             if texel.x > 2.0 {{ unused = texel; }}
         }}"
     ))
-}
-
-/// Compiles WGSL to SPIR-V.
-pub fn compile(text: &str) -> Result<Vec<u32>, String> {
-    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-    use naga::valid::{Capabilities, ValidationFlags, Validator};
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
-    let info = validator
-        .validate(&module)
-        .map_err(|e| e.emit_to_string(text))?;
-    let options = naga::back::spv::Options::default();
-    naga::back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())
 }

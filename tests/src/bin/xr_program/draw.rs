@@ -2,6 +2,7 @@
 
 use crate::api::Result;
 use crate::gpu::{Gpu, Image, ImageKind, all_of, checked};
+use crate::wgsl::compile;
 use ash::vk;
 
 /// Texels and pixels along the edges of the texture and of the pictures.
@@ -21,17 +22,6 @@ struct Corner { @builtin(position) position: vec4<f32>, @location(0) uv: vec2<f3
 }
 @fragment fn fragment(corner: Corner) -> @location(0) vec4<f32> { return textureSample(image, nearest, corner.uv); }
 ";
-
-fn compile(text: &str) -> Result<Vec<u32>> {
-    use naga::valid::{Capabilities, ValidationFlags, Validator};
-    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
-    let info = validator
-        .validate(&module)
-        .map_err(|e| e.emit_to_string(text))?;
-    let options = naga::back::spv::Options::default();
-    naga::back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())
-}
 
 /// A kind of picture: samples per pixel, and view mask.
 pub type Kind = (u32, u32);

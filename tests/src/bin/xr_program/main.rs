@@ -12,6 +12,8 @@ mod draw;
 mod gpu;
 mod session;
 mod targets;
+#[path = "../../wgsl.rs"]
+mod wgsl;
 mod wrong;
 
 use std::process::ExitCode;

@@ -2,24 +2,19 @@
 
 use serde_json::Value;
 
-/// SplitMix64.
-pub struct Random(u64);
+/// A seeded generator of numbers.
+pub struct Random(formats::random::Random);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        Self(formats::random::Random(
+            seed.wrapping_mul(0x9e37_79b9_7f4a_7c15),
+        ))
     }
 
     /// A number below `n`, 0 where n is 0.
     pub fn below(&mut self, n: usize) -> usize {
-        self.next().checked_rem(n as u64).unwrap_or(0) as usize
+        self.0.bits().checked_rem(n as u64).unwrap_or(0) as usize
     }
 
     fn pick<T: Copy>(&mut self, items: &[T]) -> T {
@@ -100,7 +95,7 @@ fn flip(mut bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
         *byte = match random.below(3) {
             0 => *byte ^ (1 << random.below(8)),
             1 => random.pick(&[0, 0x7f, 0x80, 0xff]),
-            _ => random.next() as u8,
+            _ => random.0.bits() as u8,
         };
     }
     bytes

@@ -1,22 +1,17 @@
-//! A small seeded generator of numbers (SplitMix64).
+//! A seeded generator of numbers.
 
-pub struct Generator(u64);
+use formats::random::Random;
+
+pub struct Generator(Random);
 
 impl Generator {
     pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
+        Self(Random(seed))
     }
 
     /// A number below `end`.
     pub fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
+        (self.0.bits() % end as u64) as usize
     }
 
     /// True once in `times` calls.
@@ -39,6 +34,6 @@ impl Generator {
 
     /// A generator that is independent of this one.
     pub fn split(&mut self) -> Self {
-        Self(self.next())
+        Self::new(self.0.bits())
     }
 }

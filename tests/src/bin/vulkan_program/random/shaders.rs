@@ -37,7 +37,7 @@ struct Varying { @builtin(position) position: vec4<f32>, @location(0) uv: vec2<f
 
 /// SPIR-V of the vertex shader, with entry point `vertex`.
 pub fn vertex() -> Result<Vec<u32>> {
-    crate::shaders::compile(&format!(
+    crate::wgsl::compile(&format!(
         "{VARYING}
         struct Constants {{ place: vec4<f32> }}
         var<immediate> constants: Constants;
@@ -56,7 +56,7 @@ pub fn vertex() -> Result<Vec<u32>> {
 
 /// SPIR-V of a fragment shader, with entry point `fragment`. Its push constant is at one of the offsets.
 pub fn fragment(body: usize, offset: usize) -> Result<Vec<u32>> {
-    let mut words = crate::shaders::compile(&format!(
+    let mut words = crate::wgsl::compile(&format!(
         "{VARYING}
         struct Constants {{ r: f32, g: f32, b: f32, a: f32 }}
         var<immediate> constants: Constants;
