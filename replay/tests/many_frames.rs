@@ -81,14 +81,8 @@ fn memory_does_not_grow_with_the_number_of_frames() {
     let asked: Option<u32> = (std::env::var("FRAMES").ok()).map(|frames| frames.parse().unwrap());
     let frames = asked.unwrap_or(40);
     let given = std::env::var_os("TEXTRACE").map(|path| Textrace::open(Path::new(&path)).unwrap());
-    let generated = Synthetic {
-        size_px: if asked.is_some() {
-            [480, 540]
-        } else {
-            [160, 192]
-        },
-        ..Synthetic::default()
-    };
+    let size_px = asked.map_or([160, 192], |_| [480, 540]);
+    let generated = Synthetic::one_layer(size_px, 120);
     let source: Box<dyn TileSource> = match given {
         Some(trace) => Box::new(trace),
         None => Box::new(generated.generate()),

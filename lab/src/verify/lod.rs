@@ -132,17 +132,13 @@ fn wrapped(texel: f64, size: u32, wrap: Wrap) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::texture::{ColorSpace, TexelFormat};
 
     fn texture() -> Texture {
         Texture {
-            name: String::new(),
             size: [256, 64],
             levels: 9,
             layers: 1,
-            format: TexelFormat::Bc1,
-            color_space: ColorSpace::Linear,
-            part: None,
+            ..Texture::default()
         }
     }
 

@@ -241,10 +241,7 @@ fn groups(
         let sample = texture.map(|texture| {
             let sample = Sample {
                 texture: texture as u32,
-                sampler: 0,
-                layer: 0,
-                offset: [0, 0],
-                level: Default::default(),
+                ..Sample::default()
             };
             (sample, reference.sampler)
         });

@@ -153,12 +153,7 @@ mod tests {
 
     #[test]
     fn plain_caches_have_the_replays_misses_for_the_line_list() {
-        let trace = Synthetic {
-            size_px: [72, 56],
-            layers: 2,
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::new([72, 56], 120).generate();
         for order in [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA_MERGE] {
             let mut config = RunConfig {
                 mode: Mode::Functional,

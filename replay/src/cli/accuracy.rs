@@ -219,11 +219,7 @@ mod tests {
     use sim::stream::testing::Synthetic;
 
     fn run_on(folder: &Path, traversal: &str) -> Result<ExitCode> {
-        let trace = Synthetic {
-            size_px: [48, 48],
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([48, 48], 120).generate();
         let at = |name: &str| folder.join(name).display().to_string();
         std::fs::copy(file_of(&trace).path(), at("a.textrace"))?;
         std::fs::write(at("p.json"), traversal)?;

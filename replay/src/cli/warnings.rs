@@ -110,11 +110,7 @@ mod tests {
 
     #[test]
     fn a_cache_that_holds_everything_is_at_the_bound_and_a_small_one_is_not() {
-        let trace = Synthetic {
-            size_px: [128, 128],
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([128, 128], 120).generate();
         let config = |l2_bytes| RunConfig {
             mode: Mode::Functional,
             order: Order::Z2_STA,
@@ -133,11 +129,7 @@ mod tests {
 
     #[test]
     fn the_share_of_covered_pixels_is_of_the_pictures() {
-        let trace = Synthetic {
-            size_px: [64, 64],
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([64, 64], 120).generate();
         assert_eq!(trace.tables.passes.len(), 2);
         assert_eq!(most_covered_pct(&trace, 2 * 64 * 64 / 4), Some(25.0));
     }

@@ -1,12 +1,11 @@
 //! `cores ORDER cores=N items=...`: which core runs which quad when, in functional mode. An item is the
 //! footprints of its quads, as `4.1.2`.
 
-use super::Settings;
+use super::{Settings, one_picture};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 use formats::texture::{MipFilter, Sampler};
 use replay::config::{Mode, RunConfig};
 use replay::order::{Order, PlanInputs, plan_frame};
-use replay::stream::testing::Synthetic;
 use replay::stream::{
     Consumer, Cores, Expander, LineMemory, MemoryTrace, QuadLines, TraceCounts, interleave,
 };
@@ -14,36 +13,22 @@ use replay::stream::{
 /// One row of tiles, each with one-texel quads. A nearest filter makes a footprint of each lane.
 fn trace(items: &[Vec<u32>]) -> MemoryTrace {
     let size_px = [16 * items.len() as u32, 16];
-    let mut trace = Synthetic {
-        size_px,
-        textures: 1,
-        materials: 1,
-        ..Synthetic::default()
-    }
-    .generate();
+    let mut trace = one_picture(size_px);
     trace.tables.samplers = vec![Sampler {
         mip: MipFilter::None,
         ..Sampler::TRILINEAR_REPEAT
     }];
-    trace.tables.passes.truncate(1);
-    trace.tables.passes[0].eye = None;
     let tile = |quads: &Vec<u32>| {
         let records = (0..).zip(quads).map(|(x, footprints)| QuadRecord {
             x,
-            y: 0,
             mask: ((1_u32 << footprints) - 1) as u8,
-            group: 0,
             uv: [1024; 2],
-            dx: [0; 2],
-            dy: [0; 2],
-            cross: [0; 2],
+            ..QuadRecord::default()
         });
         Tile {
             runs: vec![PrimitiveRun {
-                primitive: 0,
-                draw: 0,
-                first: 0,
                 count: quads.len() as u32,
+                ..PrimitiveRun::default()
             }],
             records: records.collect(),
         }

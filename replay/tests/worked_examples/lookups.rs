@@ -1,43 +1,27 @@
 //! `look-ups first-miss loop_cycles=N`: one footprint of two lines that share the only way of an L1.
 
-use super::Settings;
+use super::{Settings, one_picture};
 use formats::textrace::{PrimitiveRun, QuadRecord, SUBTEXELS, Tile};
 use formats::texture::{MipFilter, Sampler, TexelFormat};
 use replay::config::RunConfig;
 use replay::engine::replay;
-use replay::stream::testing::Synthetic;
 
 pub fn output(settings: &Settings) -> Vec<String> {
-    let mut trace = Synthetic {
-        size_px: [16, 16],
-        textures: 1,
-        materials: 1,
-        ..Synthetic::default()
-    }
-    .generate();
+    let mut trace = one_picture([16, 16]);
     trace.tables.samplers = vec![Sampler {
         mip: MipFilter::None,
         ..Sampler::TRILINEAR_REPEAT
     }];
     trace.tables.textures[0].format = TexelFormat::Bc1;
-    trace.tables.passes.truncate(1);
-    trace.tables.passes[0].eye = None;
     // Between the second and the third block of a row: the end of one line and the start of the next.
     let record = QuadRecord {
-        x: 0,
-        y: 0,
         mask: 1,
-        group: 0,
         uv: [8 * SUBTEXELS, 2 * SUBTEXELS],
-        dx: [0; 2],
-        dy: [0; 2],
-        cross: [0; 2],
+        ..QuadRecord::default()
     };
     let runs = vec![PrimitiveRun {
-        primitive: 0,
-        draw: 0,
-        first: 0,
         count: 1,
+        ..PrimitiveRun::default()
     }];
     trace.tiles = vec![vec![Tile {
         runs,

@@ -11,6 +11,8 @@ mod lookups;
 mod order;
 mod shaded_vertices;
 
+use replay::stream::MemoryTrace;
+use replay::stream::testing::Synthetic;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -79,6 +81,19 @@ impl Settings {
 fn parsed(key: &str, text: &str) -> u64 {
     text.parse()
         .unwrap_or_else(|_| panic!("{key}={text}: expected a number"))
+}
+
+/// A trace of one picture that is no eye's, with one texture.
+fn one_picture(size_px: [u32; 2]) -> MemoryTrace {
+    let generator = Synthetic {
+        textures: 1,
+        materials: 1,
+        ..Synthetic::one_layer(size_px, 120)
+    };
+    let mut trace = generator.generate();
+    trace.tables.passes.truncate(1);
+    trace.tables.passes[0].eye = None;
+    trace
 }
 
 /// The output of a command.

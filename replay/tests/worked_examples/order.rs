@@ -6,7 +6,7 @@ use formats::view::{Eye, EyeView, FrameViews};
 use replay::order::{
     Counters, Order, PlanInputs, TileRef, View, ViewCounters, WorkItem, plan_frame,
 };
-use replay::stream::testing::Synthetic;
+use replay::stream::testing::{Synthetic, turned_eye};
 
 pub fn output(settings: &Settings) -> Vec<String> {
     let order = Order::by_name(&settings.subject).unwrap_or_else(|why| panic!("{why:?}"));
@@ -90,28 +90,11 @@ fn eye(settings: &Settings, key: &str) -> EyeView {
         .iter()
         .map(|n| n.parse().unwrap())
         .collect();
-    let [left, right, up, down] = match numbers[..] {
-        [left, right, up, down] => [left, right, up, down],
-        _ => [1.0; 4],
-    };
+    let tangents = numbers.try_into().unwrap_or([1.0; 4]);
     let [sine, cosine] = match settings.get("turned") {
         Some("3-4-5") => [0.6, 0.8],
-        _ => [0.0, 1.0_f32],
+        _ => [0.0, 1.0],
     };
     let sine = if key == "left" { sine } else { -sine };
-    let mut view = EyeView::default();
-    view.world_to_eye[0] = [cosine, 0.0, sine, 0.0];
-    view.world_to_eye[2] = [-sine, 0.0, cosine, 0.0];
-    view.eye_to_clip = [
-        [2.0 / (left + right), 0.0, 0.0, 0.0],
-        [0.0, 2.0 / (up + down), 0.0, 0.0],
-        [
-            (right - left) / (left + right),
-            (up - down) / (up + down),
-            -1.0,
-            -1.0,
-        ],
-        [0.0; 4],
-    ];
-    view
+    turned_eye([sine, cosine], tangents)
 }

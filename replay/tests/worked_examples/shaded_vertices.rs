@@ -2,42 +2,13 @@
 //! the mesh has the vertices 3i to 3i + 2. `lists` has the triangles of each tile as `0.1`, `drawn` those with
 //! fragments.
 
-use super::Settings;
+use super::{Settings, one_picture};
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
-use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Tables, Tile};
+use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Tile};
 use replay::config::RunConfig;
 use replay::engine::replay;
 use replay::memory::Client;
-use replay::stream::testing::Synthetic;
-use replay::stream::{MemoryTrace, StreamError, TileSource};
-
-struct Trace {
-    memory: MemoryTrace,
-    geometry: Geometry,
-    lists: TileLists,
-}
-
-impl TileSource for Trace {
-    fn tables(&self) -> &Tables {
-        self.memory.tables()
-    }
-
-    fn records(&self) -> u64 {
-        self.memory.records()
-    }
-
-    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
-        self.memory.read_tile(pass, index, tile)
-    }
-
-    fn geometry(&self) -> Option<&Geometry> {
-        Some(&self.geometry)
-    }
-
-    fn tile_lists(&self, _view: usize) -> Result<TileLists, StreamError> {
-        Ok(self.lists.clone())
-    }
-}
+use replay::stream::testing::GeometryTrace;
 
 /// Triangles of each tile, as `0.1,2`; a dash for none.
 fn triangles(settings: &Settings, key: &str) -> Vec<Vec<u32>> {
@@ -52,15 +23,7 @@ pub fn output(settings: &Settings) -> Vec<String> {
     let (listed, drawn) = (triangles(settings, "lists"), triangles(settings, "drawn"));
     let size_px = [16 * listed.len() as u32, 16];
     let count = listed.iter().flatten().max().map_or(0, |last| last + 1);
-    let mut memory = Synthetic {
-        size_px,
-        textures: 1,
-        materials: 1,
-        ..Synthetic::default()
-    }
-    .generate();
-    memory.tables.passes.truncate(1);
-    memory.tables.passes[0].eye = None;
+    let mut memory = one_picture(size_px);
     memory.tables.draws = vec![Draw {
         first_primitive: 0,
         primitives: count,
@@ -75,13 +38,9 @@ pub fn output(settings: &Settings) -> Vec<String> {
         });
         let records = (0..drawn.len()).map(|x| QuadRecord {
             x: x as u8,
-            y: 0,
             mask: 15,
-            group: 0,
             uv: [1024; 2],
-            dx: [0; 2],
-            dy: [0; 2],
-            cross: [0; 2],
+            ..QuadRecord::default()
         });
         Tile {
             runs: runs.collect(),
@@ -111,10 +70,10 @@ pub fn output(settings: &Settings) -> Vec<String> {
         target: ViewTarget::Pass(0),
         size_px,
     }];
-    let trace = Trace {
+    let trace = GeometryTrace {
         memory,
         geometry,
-        lists,
+        lists: vec![lists],
     };
     let text = format!(
         "mode = \"functional\"\ncores = 1\n[frame]\nmachine = \"{}\"\ncomposition = false\n",

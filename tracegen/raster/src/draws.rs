@@ -284,9 +284,7 @@ impl DrawList {
                                 Some(Sample {
                                     texture: texture as u32,
                                     sampler: intern(&mut samplers, t.sampler),
-                                    layer: 0,
-                                    offset: [0, 0],
-                                    level: Default::default(),
+                                    ..Sample::default()
                                 })
                             })
                             .collect();

@@ -99,13 +99,7 @@ mod tests {
     fn rule(extent: u32, wrap: Wrap) -> GroupScale {
         let group = UvGroup {
             extent: [extent; 2],
-            samples: vec![Sample {
-                texture: 0,
-                sampler: 0,
-                layer: 0,
-                offset: [0, 0],
-                level: Default::default(),
-            }],
+            samples: vec![Sample::default()],
         };
         let sampler = Sampler {
             wrap: [wrap; 2],

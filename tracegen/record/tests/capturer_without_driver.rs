@@ -30,13 +30,7 @@ fn tables() -> Tables {
         primitives,
         groups: vec![UvGroup {
             extent: [EDGE; 2],
-            samples: vec![Sample {
-                texture: 0,
-                sampler: 0,
-                layer: 0,
-                offset: [0, 0],
-                level: Default::default(),
-            }],
+            samples: vec![Sample::default()],
         }],
     };
     Tables {

@@ -3,47 +3,13 @@
 use super::*;
 use crate::config::Order;
 use crate::order::PlanInputs;
-use crate::stream::MemoryTrace;
-use crate::stream::testing::Synthetic;
+use crate::stream::testing::{GeometryTrace as Trace, Synthetic};
 use formats::textrace::geometry::{GeometryView, MeshGeometry, TileLists};
-use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Surfaces, Tile};
-
-/// A trace of two pictures whose tiles may be empty, with geometry.
-struct Trace {
-    memory: MemoryTrace,
-    geometry: Geometry,
-    lists: Vec<TileLists>,
-}
-
-impl TileSource for Trace {
-    fn tables(&self) -> &formats::textrace::Tables {
-        self.memory.tables()
-    }
-
-    fn records(&self) -> u64 {
-        self.memory.records()
-    }
-
-    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
-        self.memory.read_tile(pass, index, tile)
-    }
-
-    fn geometry(&self) -> Option<&Geometry> {
-        Some(&self.geometry)
-    }
-
-    fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
-        Ok(self.lists[view].clone())
-    }
-}
+use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Surfaces};
 
 /// Two pictures of a size, drawn with one mesh. `list` gives the primitives of each tile.
 fn trace(size_px: [u32; 2], mesh: MeshGeometry, list: impl Fn(u32) -> Vec<u32>) -> Trace {
-    let mut memory = Synthetic {
-        size_px,
-        ..Synthetic::default()
-    }
-    .generate();
+    let mut memory = Synthetic::one_layer(size_px, 120).generate();
     memory.tables.draws = vec![Draw {
         first_primitive: 0,
         primitives: mesh.indices.len() as u32 / 3,
@@ -194,9 +160,7 @@ fn a_strip_shades_each_vertex_once_and_reads_its_lines_once() {
         for primitive in 0..1000 {
             tile.runs.push(PrimitiveRun {
                 primitive,
-                draw: 0,
-                first: 0,
-                count: 0,
+                ..PrimitiveRun::default()
             });
         }
     }

@@ -142,11 +142,7 @@ mod tests {
     #[test]
     fn counters_beyond_32_bits_keep_every_digit_in_sums_rates_bytes_and_json() {
         const MANY: u64 = 1 << 40;
-        let trace = Synthetic {
-            size_px: [32, 32],
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([32, 32], 120).generate();
         let config = RunConfig::default();
         let expander = Expander::new(&trace, &config).unwrap();
         let bins = expander.bins();

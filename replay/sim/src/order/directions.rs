@@ -141,27 +141,7 @@ impl Directions {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// An eye that is turned by an angle with this sine and cosine. The tangents are those of its left, right,
-    /// top and bottom edges.
-    fn eye([sine, cosine]: [f32; 2], [left, right, up, down]: [f32; 4]) -> EyeView {
-        let mut view = EyeView::default();
-        // Stored by column. The rows are the eye's axes.
-        view.world_to_eye[0] = [cosine, 0.0, sine, 0.0];
-        view.world_to_eye[2] = [-sine, 0.0, cosine, 0.0];
-        view.eye_to_clip = [
-            [2.0 / (left + right), 0.0, 0.0, 0.0],
-            [0.0, 2.0 / (up + down), 0.0, 0.0],
-            [
-                (right - left) / (left + right),
-                (up - down) / (up + down),
-                -1.0,
-                -1.0,
-            ],
-            [0.0; 4],
-        ];
-        view
-    }
+    use crate::stream::testing::turned_eye as eye;
 
     const GRID: View = View::grid(0, [60, 68]);
 

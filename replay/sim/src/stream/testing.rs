@@ -1,16 +1,17 @@
 //! Traces for tests: small ones with known lines, and generated ones whose access pattern resembles a scene's.
 
-use super::MemoryTrace;
 use super::counts::TileBins;
 use super::lines::{QuadEnd, TileLines};
 use super::tag::Tag;
+use super::{MemoryTrace, StreamError, TileSource};
 use formats::random::Random;
+use formats::textrace::geometry::{Geometry, TileLists};
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, TextraceWriter,
     Tile, TraceMeta, UvGroup,
 };
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
-use formats::view::{Eye, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
+use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
 use std::io::Write;
 use tempfile::NamedTempFile;
 
@@ -54,6 +55,27 @@ pub fn meta(eye_size_px: [u32; 2], fov: FovTangents) -> TraceMeta {
     }
 }
 
+/// An eye that is turned by an angle with this sine and cosine. The tangents are those of its left, right, top and
+/// bottom edges.
+pub fn turned_eye([sine, cosine]: [f32; 2], [left, right, up, down]: [f32; 4]) -> EyeView {
+    let mut view = EyeView::default();
+    // Stored by column. The rows are the eye's axes.
+    view.world_to_eye[0] = [cosine, 0.0, sine, 0.0];
+    view.world_to_eye[2] = [-sine, 0.0, cosine, 0.0];
+    view.eye_to_clip = [
+        [2.0 / (left + right), 0.0, 0.0, 0.0],
+        [0.0, 2.0 / (up + down), 0.0, 0.0],
+        [
+            (right - left) / (left + right),
+            (up - down) / (up + down),
+            -1.0,
+            -1.0,
+        ],
+        [0.0; 4],
+    ];
+    view
+}
+
 /// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly, and a
 /// stereo pair of one-tile passes.
 pub fn tables(sizes: &[[u32; 2]]) -> Tables {
@@ -83,10 +105,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                 samples: (0..sizes.len() as u32)
                     .map(|texture| Sample {
                         texture,
-                        sampler: 0,
-                        layer: 0,
-                        offset: [0; 2],
-                        level: Default::default(),
+                        ..Sample::default()
                     })
                     .collect(),
             }],
@@ -190,6 +209,38 @@ pub fn different_frames() -> MemoryTrace {
     trace
 }
 
+/// A trace with geometry, whose tiles may be empty.
+pub struct GeometryTrace {
+    /// The tiles.
+    pub memory: MemoryTrace,
+    /// The meshes and views.
+    pub geometry: Geometry,
+    /// The primitive lists of each view.
+    pub lists: Vec<TileLists>,
+}
+
+impl TileSource for GeometryTrace {
+    fn tables(&self) -> &Tables {
+        self.memory.tables()
+    }
+
+    fn records(&self) -> u64 {
+        self.memory.records()
+    }
+
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
+        self.memory.read_tile(pass, index, tile)
+    }
+
+    fn geometry(&self) -> Option<&Geometry> {
+        Some(&self.geometry)
+    }
+
+    fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
+        Ok(self.lists[view].clone())
+    }
+}
+
 /// Writes a trace to a file that is deleted with the handle.
 pub fn file_of(trace: &MemoryTrace) -> NamedTempFile {
     let mut writer = TextraceWriter::in_memory(&trace.tables).expect("a file");
@@ -246,13 +297,20 @@ struct Patch {
 }
 
 impl Synthetic {
-    /// Two layers of rectangles.
-    pub fn new(size_px: [u32; 2], patch_px: u32) -> Self {
+    /// One layer of rectangles.
+    pub fn one_layer(size_px: [u32; 2], patch_px: u32) -> Self {
         Self {
             size_px,
             patch_px,
-            layers: 2,
             ..Self::default()
+        }
+    }
+
+    /// Two layers of rectangles.
+    pub fn new(size_px: [u32; 2], patch_px: u32) -> Self {
+        Self {
+            layers: 2,
+            ..Self::one_layer(size_px, patch_px)
         }
     }
 
@@ -339,10 +397,7 @@ impl Synthetic {
                         samples: (0..self.textures)
                             .map(|t| Sample {
                                 texture: material * self.textures + t,
-                                sampler: 0,
-                                layer: 0,
-                                offset: [0; 2],
-                                level: Default::default(),
+                                ..Sample::default()
                             })
                             .collect(),
                     }],

@@ -31,12 +31,7 @@ fn parse(arguments: &[&str]) -> ConvertArgs {
 }
 
 fn small() -> MemoryTrace {
-    Synthetic {
-        size_px: [72, 56],
-        layers: 2,
-        ..Synthetic::default()
-    }
-    .generate()
+    Synthetic::new([72, 56], 120).generate()
 }
 
 fn textures(trace: &Trace) -> &Textrace {

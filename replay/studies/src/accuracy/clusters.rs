@@ -140,11 +140,8 @@ mod tests {
     #[test]
     fn samples_follow_assignment_flushing_and_hidden_surface_removal() {
         let mut trace = Synthetic {
-            size_px: [96, 96],
-            patch_px: 24,
-            layers: 2,
             materials: 4,
-            ..Synthetic::default()
+            ..Synthetic::new([96, 96], 24)
         }
         .generate();
         trace.tables.meta.surfaces = Some(Surfaces {
@@ -208,10 +205,8 @@ mod tests {
     #[test]
     fn clusters_and_tiles_add_up_to_the_functional_replay() {
         let trace = Synthetic {
-            size_px: [96, 64],
-            patch_px: 24,
             materials: 4,
-            ..Synthetic::default()
+            ..Synthetic::one_layer([96, 64], 24)
         }
         .generate();
         let config = RunConfig {

@@ -11,10 +11,8 @@ use sim::stream::{MemoryTrace, TileSource};
 /// A trace that fits in no cache of [`inputs`].
 pub(super) fn small_trace() -> MemoryTrace {
     Synthetic {
-        size_px: [96, 96],
-        patch_px: 24,
         materials: 4,
-        ..Synthetic::default()
+        ..Synthetic::one_layer([96, 96], 24)
     }
     .generate()
 }

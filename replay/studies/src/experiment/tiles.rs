@@ -253,12 +253,7 @@ mod tests {
 
     #[test]
     fn lines_and_quads_of_tiles_are_those_of_the_replay() {
-        let trace = Synthetic {
-            size_px: [64, 64],
-            patch_px: 16,
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([64, 64], 16).generate();
         let result = replay(&trace, &RunConfig::default()).unwrap();
         let frames = all(&trace);
         let [frame] = frames.as_slice() else {

@@ -316,25 +316,16 @@ mod tests {
         let cache = Lru::new(&items, 1, 16);
         let start: Vec<u32> = (0..64).collect();
         assert_eq!(items.misses(&start, &cache), 256);
-        let found = anneal(
-            &items,
-            &cache,
-            start.clone(),
-            &Schedule::new(20_000, 1),
-            &|_, _| None,
-        );
+        let annealed = |moves| {
+            let schedule = Schedule::new(moves, 1);
+            anneal(&items, &cache, start.clone(), &schedule, &|_, _| None)
+        };
+        let found = annealed(20_000);
         assert!(
             items.misses(&found, &cache) < 160,
             "{}",
             items.misses(&found, &cache)
         );
-        let none = anneal(
-            &items,
-            &cache,
-            start.clone(),
-            &Schedule::new(0, 1),
-            &|_, _| None,
-        );
-        assert_eq!(none, start);
+        assert_eq!(annealed(0), start);
     }
 }

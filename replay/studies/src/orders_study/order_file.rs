@@ -197,12 +197,7 @@ mod tests {
     }
 
     fn tables() -> Tables {
-        Synthetic {
-            size_px: [32, 16],
-            ..Synthetic::default()
-        }
-        .generate()
-        .tables
+        Synthetic::one_layer([32, 16], 120).generate().tables
     }
 
     #[test]

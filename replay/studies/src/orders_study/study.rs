@@ -504,12 +504,7 @@ mod tests {
     /// The ends of a figure are the changes of separate replays of the machine at each corner.
     #[test]
     fn ends_are_the_changes_at_the_corners() {
-        let trace = Synthetic {
-            size_px: [96, 80],
-            layers: 2,
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::new([96, 80], 120).generate();
         let machine = |l2_bytes, ways| RunConfig {
             mode: Mode::Functional,
             level: Levels::two(

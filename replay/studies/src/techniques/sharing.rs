@@ -89,10 +89,8 @@ mod tests {
             let mut record = record(0, 0);
             record.uv[0] += texel * formats::textrace::SUBTEXELS;
             let run = PrimitiveRun {
-                primitive: 0,
-                draw: 0,
-                first: 0,
                 count: 1,
+                ..PrimitiveRun::default()
             };
             vec![Tile {
                 runs: vec![run],
@@ -115,12 +113,7 @@ mod tests {
 
     #[test]
     fn lines_per_eye_equal_those_of_single_eye_traces() {
-        let trace = Synthetic {
-            size_px: [64, 64],
-            patch_px: 16,
-            ..Synthetic::default()
-        }
-        .generate();
+        let trace = Synthetic::one_layer([64, 64], 16).generate();
         let config = RunConfig::default();
         let found = sharing(&trace, &config).unwrap();
         for eye in [0, 1] {

@@ -119,10 +119,8 @@ pub fn write(path: &Path, manifest: &Value) {
             }
         }
         let trace = Synthetic {
-            size_px: SIZE_PX,
-            patch_px: 16,
             layers: if technique == "grey" { 1 } else { 2 },
-            ..Synthetic::default()
+            ..Synthetic::one_layer(SIZE_PX, 16)
         };
         let file = path
             .join("traces")

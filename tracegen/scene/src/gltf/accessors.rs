@@ -135,11 +135,7 @@ impl<'a> Buffers<'a> {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
                 expected,
-                format!(
-                    "{} of {}",
-                    type_name(&accessor.type_),
-                    component_name(component)
-                ),
+                kind(accessor, component, ""),
             ));
         }
         let read = |bytes: &[u8]| {
@@ -158,15 +154,14 @@ impl<'a> Buffers<'a> {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
                 "joints: Vec4 of U8 or U16, not normalized",
-                format!(
-                    "{} of {}{}",
-                    type_name(&accessor.type_),
+                kind(
+                    accessor,
+                    component,
                     if accessor.normalized {
                         "normalized "
                     } else {
                         ""
                     },
-                    component_name(component)
                 ),
             ));
         }
@@ -188,11 +183,7 @@ impl<'a> Buffers<'a> {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
                 "indices: scalars of U8, U16 or U32",
-                format!(
-                    "{} of {}",
-                    type_name(&accessor.type_),
-                    component_name(component)
-                ),
+                kind(accessor, component, ""),
             ));
         }
         let read = |bytes: &[u8]| read_index(bytes, component);
@@ -330,6 +321,12 @@ impl<'a> Elements<'a> {
 /// An index as a position in its table.
 pub(super) fn at<T>(index: &Index<T>) -> usize {
     index.value()
+}
+
+/// The type of an accessor's elements for messages, with a word before the component's.
+fn kind(accessor: &Accessor, component: ComponentType, word: &str) -> String {
+    let component = component_name(component);
+    format!("{} of {word}{component}", type_name(&accessor.type_))
 }
 
 /// A type by its glTF name.

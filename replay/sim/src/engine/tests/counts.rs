@@ -81,12 +81,7 @@ fn parts_add_up_to_the_whole() {
 
 #[test]
 fn tile_overdraw_counts_pixels_inside_the_image_only() {
-    let trace = Synthetic {
-        size_px: [40, 40],
-        patch_px: 40,
-        ..Synthetic::default()
-    }
-    .generate();
+    let trace = Synthetic::one_layer([40, 40], 40).generate();
     let config = RunConfig {
         tile_maps: true,
         ..functional(Order::MORTON)

@@ -47,19 +47,16 @@ impl Prefetcher for NextMip {
 mod tests {
     use super::*;
     use formats::layout::LayoutConfig;
-    use formats::texture::{ColorSpace, TexelFormat, Texture};
+    use formats::texture::Texture;
 
     /// A miss at a texel prefetches the lines of that texel halved, quartered, ... on the existing coarser levels.
     #[test]
     fn a_miss_prefetches_the_same_place_in_coarser_levels() {
         let texture = Texture {
-            name: "t".to_owned(),
             size: [64, 32],
             levels: 7,
             layers: 1,
-            format: TexelFormat::Bc1,
-            color_space: ColorSpace::Srgb,
-            part: None,
+            ..Texture::default()
         };
         let layout = Layout::new(&[texture], &LayoutConfig::default()).unwrap();
         let line = |level, texel| (layout.address(0, 0, level, texel).unwrap() / 16) as u32;

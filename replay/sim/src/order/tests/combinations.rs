@@ -151,11 +151,7 @@ proptest! {
 /// once.
 #[test]
 fn every_combination_conserves_the_accesses() {
-    let trace = Synthetic {
-        size_px: [56, 40],
-        ..Synthetic::default()
-    }
-    .generate();
+    let trace = Synthetic::one_layer([56, 40], 120).generate();
     let trace = repeated(&trace, 2);
     let mut configs = Vec::new();
     for (number, order) in (0_u32..).zip(all(2).into_iter().step_by(STRIDE)) {

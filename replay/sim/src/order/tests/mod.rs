@@ -372,11 +372,7 @@ fn a_new_order_needs_only_a_file_and_a_row() {
     assert_eq!(Order::find("test-columns").unwrap(), order);
     let config: RunConfig =
         toml::from_str("order = \"test-columns\"\nmode = \"functional\"").unwrap();
-    let trace = Synthetic {
-        size_px: [72, 56],
-        ..Synthetic::default()
-    }
-    .generate();
+    let trace = Synthetic::one_layer([72, 56], 120).generate();
     let scanline = RunConfig {
         mode: Mode::Functional,
         order: Order::SCANLINE,
