@@ -178,10 +178,7 @@ pub(super) fn checker(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
             40
         }])
     };
-    let picture = image::GrayImage::from_fn(size[0], size[1], texel);
-    let mut png = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut png, image::ImageFormat::Png)?;
-    Ok(png.into_inner())
+    png(image::GrayImage::from_fn(size[0], size[1], texel))
 }
 
 /// A PNG of this size with round holes.
@@ -191,8 +188,12 @@ pub(super) fn holes(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
         let solid = off(x).hypot(off(y)) > 5.0;
         image::Rgba([200, 120, 60, if solid { 255 } else { 0 }])
     };
-    let picture = image::RgbaImage::from_fn(size[0], size[1], texel);
+    png(image::RgbaImage::from_fn(size[0], size[1], texel))
+}
+
+fn png(picture: impl Into<image::DynamicImage>) -> anyhow::Result<Vec<u8>> {
     let mut png = std::io::Cursor::new(Vec::new());
+    let picture: image::DynamicImage = picture.into();
     picture.write_to(&mut png, image::ImageFormat::Png)?;
     Ok(png.into_inner())
 }

@@ -136,29 +136,38 @@ pub(super) fn pieces(
     (2..projected.len()).map(triangle).collect()
 }
 
-/// Clips a triangle to `0 <= z <= w` (Sutherland and Hodgman 1974).
+/// The part of a polygon where `distance` is not negative (Sutherland and Hodgman 1974). `between` gives the vertex at a
+/// fraction of the way between two others.
+fn clip<V: Copy>(
+    polygon: &[V],
+    distance: impl Fn(&V) -> f64,
+    between: impl Fn(&V, &V, f64) -> V,
+) -> Vec<V> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, current) in polygon.iter().enumerate() {
+        let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
+        let (dp, dc) = (distance(previous), distance(current));
+        if (dp < 0.0) != (dc < 0.0) {
+            kept.push(between(previous, current, dp / (dp - dc)));
+        }
+        if dc >= 0.0 {
+            kept.push(*current);
+        }
+    }
+    kept
+}
+
+/// Clips a triangle to `0 <= z <= w`.
 fn clip_to_depth_range(triangle: &[ClipVertex; 3]) -> Vec<ClipVertex> {
     let near = |v: &ClipVertex| v.clip.z;
     let far = |v: &ClipVertex| v.clip.w - v.clip.z;
     let mut polygon = triangle.to_vec();
     for distance in [&near as &dyn Fn(&ClipVertex) -> f64, &far] {
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, current) in polygon.iter().enumerate() {
-            let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
-            let (dp, dc) = (distance(previous), distance(current));
-            if (dp < 0.0) != (dc < 0.0) {
-                let t = dp / (dp - dc);
-                kept.push(ClipVertex {
-                    clip: previous.clip.lerp(current.clip, t),
-                    weights: previous.weights.lerp(current.weights, t),
-                    error: previous.error.between(current.error),
-                });
-            }
-            if dc >= 0.0 {
-                kept.push(*current);
-            }
-        }
-        polygon = kept;
+        polygon = clip(&polygon, distance, |previous, current, t| ClipVertex {
+            clip: previous.clip.lerp(current.clip, t),
+            weights: previous.weights.lerp(current.weights, t),
+            error: previous.error.between(current.error),
+        });
     }
     // Vertices that are not finite are on neither side.
     polygon.retain(|v| v.clip.is_finite() && v.clip.w > 0.0);
@@ -174,18 +183,7 @@ fn clip_to_screen(triangle: &[Corner; 3], size_px: [u32; 2]) -> Vec<Corner> {
         }];
     let mut polygon = triangle.to_vec();
     for distance in inside {
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, current) in polygon.iter().enumerate() {
-            let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
-            let (dp, dc) = (distance(previous.at), distance(current.at));
-            if (dp < 0.0) != (dc < 0.0) {
-                kept.push(previous.toward(current, dp / (dp - dc)));
-            }
-            if dc >= 0.0 {
-                kept.push(*current);
-            }
-        }
-        polygon = kept;
+        polygon = clip(&polygon, |corner| distance(corner.at), Corner::toward);
     }
     polygon
 }

@@ -108,11 +108,7 @@ impl Axis {
         if let Some((low, high)) = self.range {
             return low..high;
         }
-        let (low, high) = places
-            .fold(None, |range: Option<(f64, f64)>, v| {
-                Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
-            })
-            .unwrap_or((0.0, 1.0));
+        let (low, high) = ends(places).unwrap_or((0.0, 1.0));
         // Points keep a distance from the edges; an axis that comes near zero starts at zero.
         let room = match 0.04 * (high - low) {
             room if room > 1e-9 * high.abs() => room,
@@ -245,6 +241,13 @@ impl Ranged for Ticked {
     fn range(&self) -> Range<f64> {
         self.range.range()
     }
+}
+
+/// The least and the greatest value.
+pub(crate) fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .map(|v| (v, v))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 /// Ticks of a few digits.

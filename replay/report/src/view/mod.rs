@@ -11,7 +11,7 @@ pub(super) use markup::{ramp, viewer};
 use super::answers;
 use super::html::{self, Answer, Page, count};
 use super::picture::EmbeddedPicture;
-use super::plots::{PlotError, heatmap};
+use super::plots::heatmap;
 use super::run;
 use super::z2::whole_frame;
 use formats::textrace::{Pass, PassKind, Tables};
@@ -20,7 +20,6 @@ use maud::html;
 use pack::{Packed, packed};
 use parts::{Maps, PartSums, Parts};
 use serde::Serialize;
-use sim::engine::ReplayError;
 use sim::result::{RunResult, TileMap};
 use studies::experiment::{
     Counts, FULL, FrameContent, FrameTiles, L2Content, PassTiles, ResultRow, STEPS, frame_tiles,
@@ -38,23 +37,6 @@ pub struct ViewReport<'a> {
     pub draws: &'a [ResultRow<'a>],
     /// Rendered picture of both eyes.
     pub picture: Option<&'a EmbeddedPicture>,
-}
-
-/// Why a page cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ViewError {
-    /// An unreadable trace.
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    /// Textures that cannot be laid out.
-    #[error(transparent)]
-    Layout(#[from] formats::Broken),
-    /// A number that JSON cannot hold.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    /// A chart that cannot be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
 }
 
 /// The data of the page's script.
@@ -144,7 +126,7 @@ impl<'a> ViewReport<'a> {
     ///
     /// # Errors
     /// A trace that cannot be read, or a page that cannot be written.
-    pub fn page(&self) -> Result<(String, usize), ViewError> {
+    pub fn page(&self) -> anyhow::Result<(String, usize)> {
         let Some(first) = self.rows.first() else {
             return Ok(Default::default());
         };
@@ -162,7 +144,7 @@ impl<'a> ViewReport<'a> {
             }
             index += 1;
             sums.add(&mut tiles);
-            Ok::<(), ViewError>(())
+            anyhow::Ok(())
         })?;
         let mut data = self.data(tables, &sums)?;
         let mut bytes = serde_json::to_string(&data)?.len();
@@ -217,7 +199,7 @@ impl<'a> ViewReport<'a> {
         out
     }
 
-    fn data(&self, tables: &'a Tables, sums: &PartSums) -> Result<Data<'a>, ViewError> {
+    fn data(&self, tables: &'a Tables, sums: &PartSums) -> anyhow::Result<Data<'a>> {
         let config = &self.rows[0].point.config;
         let runs = self.rows.iter().map(|row| {
             let (order, result) = (row.point.config.order, row.result);

@@ -4,6 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::tables::busiest;
 use crate::columns::{Column, pick};
 use crate::figures::{figure, number};
+use crate::plots::axis;
 use crate::plots::bars::{BarChart, BarGroup};
 use crate::plots::contours::{ContourChart, PointSeries};
 use crate::plots::hbars::HBarChart;
@@ -172,12 +173,8 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
         })
         .filter(|s| !s.points.is_empty())
         .collect();
-    let ends = series
-        .iter()
-        .flat_map(|s| s.points.iter().flat_map(|p| [p.0, p.1]))
-        .fold(None, |range: Option<(f64, f64)>, v| {
-            Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
-        })?;
+    let points = series.iter().flat_map(|s| &s.points);
+    let ends = axis::ends(points.flat_map(|p| [p.0, p.1]))?;
     let ends = (
         (ends.0 / 5.0).floor() * 5.0,
         ((ends.1 / 5.0).ceil() * 5.0).min(100.0),

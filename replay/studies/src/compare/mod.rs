@@ -25,17 +25,6 @@ use sim::order::TileRef;
 use sim::stream::{StreamError, TileSource, shaded};
 use tile::Comparer;
 
-/// Reasons why captures cannot be compared.
-#[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    /// The captures do not show the same scene and views.
-    #[error(transparent)]
-    NotComparable(#[from] NotComparable),
-    /// An unreadable trace.
-    #[error(transparent)]
-    Trace(#[from] StreamError),
-}
-
 /// A class of fragments: those of a material, or of opaque draws.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
@@ -77,10 +66,7 @@ pub fn comparable(tables: [&Tables; 2]) -> Result<(), NotComparable> {
 /// # Errors
 /// Captures that do not show the same views of the same textured triangles; a trace without the fragments
 /// that the removal needs; an unreadable tile.
-pub fn compare(
-    traces: [&dyn TileSource; 2],
-    config: &RunConfig,
-) -> Result<Comparison, CompareError> {
+pub fn compare(traces: [&dyn TileSource; 2], config: &RunConfig) -> anyhow::Result<Comparison> {
     /// Tiles that a thread compares per task.
     const CHUNK: usize = 64;
     let partners = Partners::new(traces.map(TileSource::tables))?;

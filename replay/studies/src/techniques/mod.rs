@@ -25,5 +25,5 @@ pub use pacing::{Pacing, RATES_HZ};
 pub use pareto::{LEAST_SAMPLES, dominated, dominated_in_time};
 pub use pictures::{PictureFigures, picture_figures};
 pub use sharing::{Sharing, sharing};
-pub use skipped::{Difference, DifferenceError, differences};
+pub use skipped::{Difference, differences};
 pub use timing::{REFRESH_HZ, Spread, Timing};

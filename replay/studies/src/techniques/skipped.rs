@@ -1,7 +1,7 @@
 //! Pictures of the work that a technique skipped, next to its image error.
 
 use super::pictures::reference;
-use super::{Folder, FolderError, PictureFigures};
+use super::{Folder, PictureFigures};
 use formats::textrace::{PassKind, QuadRecord, Tile};
 use formats::view::{Eye, TILE_SIZE_PX};
 use image_error::Picture;
@@ -29,17 +29,6 @@ pub struct Difference {
     pub shaded_pct: Option<f64>,
 }
 
-/// Reason why a difference picture failed.
-#[derive(Debug, thiserror::Error)]
-pub enum DifferenceError {
-    /// A picture.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// A trace.
-    #[error(transparent)]
-    Trace(#[from] StreamError),
-}
-
 /// The difference pictures of a folder, for all rows whose pictures or fragments differ from the
 /// baseline's. `figures` and `traces` have one entry per row. For a row with a trace, the picture is the
 /// worst of the trace's frames.
@@ -50,7 +39,7 @@ pub fn differences(
     folder: &Folder,
     figures: &[PictureFigures],
     traces: &[Option<&dyn TileSource>],
-) -> Result<Vec<Difference>, DifferenceError> {
+) -> anyhow::Result<Vec<Difference>> {
     let manifest = &folder.manifest;
     let rows = &manifest.rows;
     let Some(baseline) = rows.iter().position(|r| r.technique == manifest.baseline) else {
