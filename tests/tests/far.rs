@@ -142,22 +142,9 @@ const PLACES: [[f64; 3]; 5] = [
 fn a_sphere_has_the_same_records_from_zero_to_ten_million() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let sphere = Sphere::new();
-    let node = |at| {
-        capture(
-            folder.path(),
-            "a.gltf",
-            &sphere.gltf(at, 1.0),
-            &before(at, 1.0),
-        )
-    };
-    let baked = |at| {
-        capture(
-            folder.path(),
-            "a.obj",
-            &sphere.obj(at, 1.0),
-            &before(at, 1.0),
-        )
-    };
+    let seen = |at, file, text: &str| capture(folder.path(), file, text, &before(at, 1.0));
+    let node = |at| seen(at, "a.gltf", &sphere.gltf(at, 1.0));
+    let baked = |at| seen(at, "a.obj", &sphere.obj(at, 1.0));
     let (by_node, by_vertices) = (node([0.0; 3]), baked([0.0; 3]));
     assert!(quads(&by_node) > 2000, "{}", quads(&by_node));
     assert!(by_node == by_vertices, "loaders agree");

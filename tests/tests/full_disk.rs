@@ -70,6 +70,13 @@ fn fails(mut command: Command, reasons: &[&str], place: &str) {
     assert!(has_reason, "{place}: none of {reasons:?} in {message}");
 }
 
+/// Checks that a writer that failed left only whole files.
+fn check_left(folder: &Path, whole: &Files, writer: &Writer, place: &str) {
+    let left = Files::below(folder);
+    left.assert_part_of(whole, writer, place);
+    assert_eq!(left.unfinished, [""; 0], "{place}");
+}
+
 /// The files that each writer writes on a large disk.
 fn whole(writer: &Writer, inputs: &Path) -> Files {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -110,9 +117,7 @@ fn a_full_disk_is_reported_at_every_size() {
                 &["No space left", "captures failed"],
                 &place,
             );
-            let left = Files::below(&folder);
-            left.assert_part_of(&whole, writer, &place);
-            assert_eq!(left.unfinished, [""; 0], "{place}");
+            check_left(&folder, &whole, writer, &place);
             tries += 1;
         }
     }
@@ -147,9 +152,7 @@ fn files_beyond_a_size_limit_are_reported_at_every_size() {
             }
             let place = format!("{} below {limit} blocks", writer.name);
             fails(shell, &["too large", "captures failed"], &place);
-            let left = Files::below(folder.path());
-            left.assert_part_of(&whole, writer, &place);
-            assert_eq!(left.unfinished, [""; 0], "{place}");
+            check_left(folder.path(), &whole, writer, &place);
             tries += 1;
         }
     }
