@@ -9,9 +9,8 @@ const CRATES: [(&str, &[&[&str]]); 2] = [
     (
         "sim",
         &[
-            // `add_fields` is the macro of `sums`, `choices` that of `registry`.
+            // `choices` is the macro of `registry`.
             &[
-                "add_fields",
                 "choices",
                 "model_version",
                 "palette",

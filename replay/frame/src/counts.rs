@@ -64,7 +64,7 @@ impl CoreCycles {
 
     /// Adds other cycles.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(
+        formats::add_fields!(
             self, other, issue, texture, no_work, barrier, raster, mshr, dram, l2, latency
         );
     }

@@ -400,7 +400,7 @@ impl Device {
             core.count_until(now);
             let of = &core.counts;
             all.cycles.add(&of.cycles);
-            sim::add_fields!(
+            formats::add_fields!(
                 all,
                 of,
                 warp_cycles,

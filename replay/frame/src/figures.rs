@@ -87,7 +87,7 @@ impl Figures {
         let mut all = Counts::default();
         for (_, of) in &time.frames {
             all.cycles.add(&of.cycles);
-            sim::add_fields!(all, of, footprints, alu_ticks, dram_cycles);
+            formats::add_fields!(all, of, footprints, alu_ticks, dram_cycles);
             for (sums, counts) in [
                 (&mut all.requests[..], &of.requests[..]),
                 (&mut all.l1[..], &of.l1[..]),

@@ -45,7 +45,7 @@ pub struct Figures {
 impl Figures {
     /// Adds the figures of another cache of the level.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             accesses,

@@ -114,7 +114,7 @@ impl WorkingSet {
 
     /// Adds the windows of another core.
     pub(crate) fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, stretches, lines, lines_of_either);
+        formats::add_fields!(self, other, stretches, lines, lines_of_either);
         for (lines, other) in self.lines_of_eye.iter_mut().zip(other.lines_of_eye) {
             *lines += other;
         }

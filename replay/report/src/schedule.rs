@@ -342,7 +342,7 @@ impl Document for ScheduleReport {
 }
 
 impl ScheduleReport {
-    /// The table of a terminal.
+    /// The table of the text and the page.
     #[rustfmt::skip]
     fn table(&self) -> Table {
         let waits = |c: &CoreCycles| c.mshr + c.dram + c.l2;

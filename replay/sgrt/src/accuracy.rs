@@ -54,7 +54,7 @@ impl Accuracy {
     /// Counts of all reused samples, overlapped ones included.
     pub(super) fn all_reused(&self) -> ClassCounts {
         let (mut sum, other) = (self.reused, &self.overlapped);
-        sim::add_fields!(
+        formats::add_fields!(
             sum,
             other,
             pixels,

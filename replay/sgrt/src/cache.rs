@@ -27,7 +27,7 @@ pub struct Misses {
 impl Misses {
     /// Adds another batch's misses.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, l1_lines, l2_lines, l1_visits, l2_visits);
+        formats::add_fields!(self, other, l1_lines, l2_lines, l1_visits, l2_visits);
     }
 
     /// Bytes fetched by the L2.

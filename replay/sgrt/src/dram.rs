@@ -25,7 +25,7 @@ impl DramBytes {
 
     /// Adds another batch's bytes.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             hierarchy_bytes,

@@ -30,7 +30,12 @@ pub trait RaySource: Sync {
     ///
     /// # Errors
     /// As [`Self::tile`].
-    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
         self.tile(eye, index, tile)
     }
 
@@ -52,7 +57,12 @@ impl RaySource for Raytrace {
         Ok(self.decode_tile(eye, index, tile)?)
     }
 
-    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
         Ok(self.decode_tile_with_geometry(eye, index, tile)?)
     }
 

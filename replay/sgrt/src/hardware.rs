@@ -234,7 +234,7 @@ pub(super) fn decoded(
         let (eye, tile) = (eye_of(at), at.tile);
         let mut data = RayTile::default();
         let decoded = if needs_geometry {
-            source.full_tile(eye, tile, &mut data)
+            source.tile_with_geometry(eye, tile, &mut data)
         } else {
             source.tile(eye, tile, &mut data)
         };

@@ -23,8 +23,13 @@ impl RaySource for OfKinds<'_> {
         Ok(())
     }
 
-    fn full_tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
-        self.source.full_tile(eye, index, tile)?;
+    fn tile_with_geometry(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), TileError> {
+        self.source.tile_with_geometry(eye, index, tile)?;
         self.keep(tile);
         Ok(())
     }

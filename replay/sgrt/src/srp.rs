@@ -42,7 +42,7 @@ impl SrpCycles {
 
     /// Adds another batch's cycles.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, generation, shading, reproject, detect, reuse);
+        formats::add_fields!(self, other, generation, shading, reproject, detect, reuse);
         self.lanes = other.lanes;
     }
 }

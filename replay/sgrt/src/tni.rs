@@ -58,7 +58,7 @@ impl TniCycles {
 
     /// Adds another batch's cycles, resource by resource.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, traversal, intersection, handover, latency);
+        formats::add_fields!(self, other, traversal, intersection, handover, latency);
     }
 }
 

@@ -145,9 +145,9 @@ impl BatchWork {
     /// Adds another batch.
     pub fn add(&mut self, other: &Self) {
         for (sum, part) in self.by_class.iter_mut().zip(&other.by_class) {
-            sim::add_fields!(sum, part, rays, steps, triangle_tests, alpha_tests);
+            formats::add_fields!(sum, part, rays, steps, triangle_tests, alpha_tests);
         }
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             retest_rays,

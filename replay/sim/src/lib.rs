@@ -38,5 +38,4 @@ pub mod tmu;
 
 pub use config::RunConfig;
 pub use engine::{ReplayError, replay};
-pub use formats::add_fields;
 pub use result::RunResult;

@@ -32,7 +32,7 @@ pub struct LevelCounters {
 impl LevelCounters {
     /// Adds another part's counters.
     pub fn add(&mut self, other: &Self) {
-        crate::add_fields!(
+        formats::add_fields!(
             self,
             other,
             footprints,
@@ -118,7 +118,7 @@ impl PrefetchResult {
     /// The sums of two prefetchers' counts.
     #[must_use]
     pub fn plus(mut self, other: Self) -> Self {
-        crate::add_fields!(
+        formats::add_fields!(
             self,
             other,
             lines,

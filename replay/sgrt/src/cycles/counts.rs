@@ -21,7 +21,7 @@ impl LineCounts {
     }
 
     fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, hits, merged, misses);
+        formats::add_fields!(self, other, hits, merged, misses);
     }
 }
 
@@ -50,7 +50,7 @@ impl UnitCycles {
     }
 
     fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, busy, no_ray, mshr, dram, l2, latency);
+        formats::add_fields!(self, other, busy, no_ray, mshr, dram, l2, latency);
     }
 }
 
@@ -120,7 +120,7 @@ pub struct Counts {
 impl Counts {
     /// Adds other counters.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             rays_entered,
@@ -141,7 +141,7 @@ impl Counts {
         self.l2.add(&other.l2);
         self.cycles.add(&other.cycles);
         let (own, other) = (&mut self.prefetch, &other.prefetch);
-        sim::add_fields!(
+        formats::add_fields!(
             own,
             other,
             requested,

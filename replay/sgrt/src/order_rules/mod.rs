@@ -54,7 +54,7 @@ pub struct Count {
 impl Count {
     /// Adds another part.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, read, fetched);
+        formats::add_fields!(self, other, read, fetched);
     }
 
     /// The fetched lines per line read, relative to those of another frame's part. Parts without lines are equal.

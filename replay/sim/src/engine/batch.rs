@@ -33,7 +33,7 @@ pub struct Work {
 impl Work {
     /// Adds the counts of another batch.
     pub fn add(&mut self, other: &Self) {
-        crate::add_fields!(self, other, replays, passes, expansions);
+        formats::add_fields!(self, other, replays, passes, expansions);
     }
 
     /// Describes for the user what was shared and skipped among `points` points.

@@ -231,10 +231,10 @@ impl TraceCounts {
 
     /// Adds the counts of a worker thread.
     pub(super) fn add(&mut self, other: &Self) {
-        crate::add_fields!(self, other, quads, lanes);
+        formats::add_fields!(self, other, quads, lanes);
         self.hash = self.hash.wrapping_add(other.hash);
         for (cell, other) in self.cells.iter_mut().zip(&other.cells) {
-            crate::add_fields!(cell, other, footprints, line_lookups);
+            formats::add_fields!(cell, other, footprints, line_lookups);
         }
     }
 

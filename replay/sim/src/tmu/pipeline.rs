@@ -33,7 +33,7 @@ pub struct PipelineStats {
 impl PipelineStats {
     /// Adds another core's counters.
     pub fn add(&mut self, other: &Self) {
-        crate::add_fields!(self, other, useful, wasted, idle, threads, loops);
+        formats::add_fields!(self, other, useful, wasted, idle, threads, loops);
     }
 
     /// Useful cycles over all cycles, 0 to 1.

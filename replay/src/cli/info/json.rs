@@ -298,7 +298,7 @@ impl RayCounts {
     }
 
     fn add(mut self, other: Self) -> Self {
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             samples,

@@ -55,7 +55,7 @@ impl Differences {
 
     /// Adds another distribution.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(self, other, count, sum);
+        formats::add_fields!(self, other, count, sum);
         self.largest = self.largest.max(other.largest);
         for (bin, count) in &other.bins {
             *self.bins.entry(*bin).or_insert(0) += count;

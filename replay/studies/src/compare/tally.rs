@@ -55,7 +55,7 @@ impl Default for Tally {
 impl Tally {
     /// Adds another class.
     pub fn add(&mut self, other: &Self) {
-        sim::add_fields!(
+        formats::add_fields!(
             self,
             other,
             fragments_in_both,
@@ -65,7 +65,7 @@ impl Tally {
         );
         self.uv_texels.add(&other.uv_texels);
         self.lod_levels.add(&other.lod_levels);
-        sim::add_fields!(self, other, footprints, footprints_that_differ);
+        formats::add_fields!(self, other, footprints, footprints_that_differ);
     }
 
     /// Fragments in at least one capture.
