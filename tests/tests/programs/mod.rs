@@ -3,6 +3,7 @@
 //! its last record reads. The picture is the same without the layer.
 
 mod fields;
+mod instances;
 pub(crate) mod opengl;
 mod other_stages;
 pub(crate) mod pixels;

@@ -126,6 +126,16 @@ fn environments_that_would_hide_the_layer_are_overcome_or_named() {
     ] {
         run_ok(app(folder.path(), &[variable]).args(["--", of_program]));
     }
+    // A program's own layers are found, by default in the system's folders.
+    let system = Path::new("/usr/share/vulkan/explicit_layer.d");
+    if system.join("VkLayer_MESA_overlay.json").exists() {
+        let folders = [("VK_LAYER_PATH", system.to_str().expect("a path"))];
+        for folders in [&[][..], &folders] {
+            let layer = ("PROGRAM_LAYER", "VK_LAYER_MESA_overlay");
+            let variables = [folders, &[layer]].concat();
+            run_ok(app(folder.path(), &variables).args(["--", of_program]));
+        }
+    }
     let missing = [("VK_DRIVER_FILES", "/none/such.json")];
     parallax_tests::refuse(
         app(folder.path(), &missing).args(["--", of_program]),

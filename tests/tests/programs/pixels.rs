@@ -21,7 +21,7 @@ pub fn texel_of_color([x, y, level, layer]: [u8; 4]) -> Option<[u32; 4]> {
 #[derive(Clone, Copy)]
 pub struct Last {
     pub draw: u32,
-    record: QuadRecord,
+    pub record: QuadRecord,
     operands: Option<QuadRecord>,
 }
 

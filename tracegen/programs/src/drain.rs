@@ -2,6 +2,7 @@
 
 mod frame_builder;
 mod images;
+mod instances;
 mod places;
 mod portions;
 mod quads;
@@ -13,7 +14,7 @@ use formats::textrace::{
     LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
 };
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
-use frame_builder::{Builder, StereoDraw};
+use frame_builder::{Builder, StereoDraw, primitives};
 use places::Placement;
 use record::{CaptureCounts, RecordError, Recorder};
 use spool::FramesBy;
@@ -130,7 +131,15 @@ pub fn drain<W: Write + Seek>(
                 room: job.record_bytes,
             }));
         }
-        let records = session.records(number)?;
+        let mut records = session.records(number)?;
+        for draw in &frame.draws {
+            if let Some(info) = session.draw(draw.draw)
+                && let Some(shader) = session.shader_of(info)
+                && let Some(records) = records.get_mut(&draw.draw)
+            {
+                instances::number(shader, info, primitives(info), records);
+            }
+        }
         let weights: Vec<u64> = frame
             .draws
             .iter()

@@ -63,7 +63,12 @@ impl Gpu {
         unsafe {
             let entry = Entry::load().map_err(|e| format!("no Vulkan loader: {e}"))?;
             let application = vk::ApplicationInfo::default().api_version(version);
-            let info = vk::InstanceCreateInfo::default().application_info(&application);
+            // A layer that the program asks for.
+            let layer = std::env::var("PROGRAM_LAYER").map(|name| format!("{name}\0"));
+            let layers: Vec<_> = layer.iter().map(|name| name.as_ptr().cast()).collect();
+            let info = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_layer_names(&layers);
             let instance = checked("an instance", entry.create_instance(&info, None))?;
             let devices = checked("devices", instance.enumerate_physical_devices())?;
             let physical = *devices.first().ok_or("no Vulkan device")?;

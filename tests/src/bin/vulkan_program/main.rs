@@ -5,7 +5,7 @@
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
 //!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang|before] [--libraries 0|1|2]
-//!         [--also vertex,compute,late,event,unread]
+//!         [--also vertex,compute,late,event,unread] [--instances N] [--draws N]
 //!     vulkan_program --random SEED [--calls N] [--frames N] [--picture FILE]
 //!     vulkan_program --fields NAME,NAME...
 //!
@@ -57,6 +57,10 @@ pub struct Options {
     also: also::Also,
     /// Libraries that pipelines are linked from.
     libraries: Option<libraries::Split>,
+    /// Instances of each draw.
+    instances: u32,
+    /// Draws of each object, the first instances of which ascend from 0.
+    draws: u32,
     /// Full-screen draws, one per frame.
     fields: Vec<&'static fields::Field>,
     /// Seed of random calls.
@@ -75,6 +79,8 @@ fn options() -> Result<Options, String> {
         end: None,
         also: also::Also::default(),
         libraries: None,
+        instances: 1,
+        draws: 1,
         fields: Vec::new(),
         random: None,
         calls: 100,
@@ -109,6 +115,8 @@ fn options() -> Result<Options, String> {
                 let (width, height) = value.split_once('x').ok_or(format!("--size: {value}"))?;
                 options.size_px = [number(width)?, number(height)?];
             }
+            "--instances" => options.instances = number(&value)?,
+            "--draws" => options.draws = number(&value)?,
             "--picture" => options.picture = Some(value),
             "--end" => options.end = Some(value),
             "--also" => options.also = also::Also::parse(&value)?,

@@ -165,7 +165,9 @@ fn draw_target(
             for draw in draws {
                 device.cmd_bind_pipeline(buffer, graphics, draw.pipeline);
                 device.cmd_bind_vertex_buffers(buffer, 0, &[draw.vertices.handle], &[0]);
-                device.cmd_draw(buffer, draw.count, 1, 0, 0);
+                for first in 0..options.draws {
+                    device.cmd_draw(buffer, draw.count, options.instances, 0, first);
+                }
             }
         }
         device.cmd_end_render_pass(buffer);

@@ -33,8 +33,8 @@ pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, S
         false => "",
     };
     let eye = match stereo {
-        Stereo::Multiview => "@builtin(view_index) eye: i32",
-        _ => "@builtin(instance_index) unused: u32",
+        Stereo::Multiview => ", @builtin(view_index) eye: i32",
+        _ => "",
     };
     let index = match stereo {
         Stereo::Multiview => "eye",
@@ -43,10 +43,13 @@ pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, S
     let text = format!(
         "{HEAD}
         @vertex fn vertex(
-            @location(0) place: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) direction: vec3<f32>, {eye}
+            @location(0) place: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) direction: vec3<f32>,
+            @builtin(instance_index) instance: u32{eye}
         ) -> Fragment {{
             var out: Fragment;
-            out.position = eyes.clip_from_world[{index}] * vec4(place * constants.scale, 1.0);
+            // Each instance is nearer than the one before.
+            let at = place + f32(instance) * vec3(0.05, 0.02, 0.3);
+            out.position = eyes.clip_from_world[{index}] * vec4(at * constants.scale, 1.0);
             out.uv = uv;
             out.direction = direction;
             {read}

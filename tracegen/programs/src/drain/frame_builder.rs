@@ -263,7 +263,7 @@ impl<W: Write + Seek> Builder<W> {
             most = most.max(record.primitive.saturating_add(1));
         }
         self.count_left_out(shader, parts_records.iter().copied().flatten());
-        let triangles = most.max(primitives(info));
+        let triangles = most.max(primitives(info).saturating_mul(info.instances.max(1)));
         let draws = self.declare(session, info, shader, &used, &parts_records, triangles)?;
         let replay = draws.replay;
         for (executed, part) in &parts {
@@ -466,7 +466,7 @@ impl<W: Write + Seek> Builder<W> {
 }
 
 /// Number of primitives of a draw call; 0 for indirect draws.
-fn primitives(info: &DrawInfo) -> u32 {
+pub fn primitives(info: &DrawInfo) -> u32 {
     use vk::PrimitiveTopology as Kind;
     let vertices = info.vertices;
     match Kind::from_raw(info.topology) {
