@@ -75,16 +75,18 @@ pub fn register_openxr(
 /// Makes a program load the registered layer.
 pub fn announce(command: &mut Command, folder: &Path) {
     let value = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+    // The loader ignores additional folders if the user has replaced the system's.
+    let folders = match value("VK_LAYER_PATH") {
+        Some(_) => "VK_LAYER_PATH",
+        None => "VK_ADD_LAYER_PATH",
+    };
     command
         .env(FOLDER_VARIABLE, folder)
         .env(
             "VK_INSTANCE_LAYERS",
             prepended(value("VK_INSTANCE_LAYERS"), LAYER_NAME.into()),
         )
-        .env(
-            "VK_LAYER_PATH",
-            prepended(value("VK_LAYER_PATH"), folder.into()),
-        );
+        .env(folders, prepended(value(folders), folder.into()));
     if let Some(disabled) = value(DISABLED_LAYERS) {
         match without_layer(&disabled.to_string_lossy()) {
             Some(others) => command.env(DISABLED_LAYERS, others),
