@@ -2,7 +2,7 @@
 
 use super::core::{Asks, Core};
 use super::counts::Counts;
-use super::dram::{Answer, Dram};
+use super::dram::{Answer, Dram, MakeChannels};
 use super::l2::{Found, L2};
 use super::machine::Machine;
 use super::timeline::{FrameTimeline, TileSpan};
@@ -89,13 +89,13 @@ impl Device {
     ///
     /// # Errors
     /// An impossible cache.
-    pub fn new(machine: &Machine) -> Result<Self, ConfigError> {
+    pub fn new(machine: &Machine, channels: &MakeChannels<'_>) -> Result<Self, ConfigError> {
         let cores: Result<Vec<Core>, _> = (0..machine.cores).map(|_| Core::new(machine)).collect();
         Ok(Self {
             cores: cores?,
             l2: L2::new(machine)?,
             ports: vec![Servers::new(1, machine.port_ticks); machine.cores],
-            dram: Dram::new(machine),
+            dram: Dram::new(machine, channels),
             calendar: Calendar::new(DAYS),
             now: 0,
             dram_wake: u64::MAX,

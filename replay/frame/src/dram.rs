@@ -2,7 +2,7 @@
 
 use super::machine::{DramMachine, Machine};
 use sim::memory::TICKS;
-use sim::memory::dram::ClosedLoop;
+use sim::memory::dram::{Channels, ClosedLoop, DramConfig};
 use std::collections::VecDeque;
 
 /// An answer.
@@ -59,12 +59,15 @@ enum Kind {
     Banks(Box<ClosedLoop>, Vec<(u64, u64)>),
 }
 
+/// Makes the channels of a machine with banks and rows.
+pub type MakeChannels<'a> = dyn Fn(&DramConfig) -> Box<dyn Channels> + Sync + 'a;
+
 /// Reads have the number of their line, writes this bit, the number of their tile and the place in it.
 const WRITE: u64 = 1 << 62;
 
 impl Dram {
     /// An idle memory.
-    pub fn new(machine: &Machine) -> Self {
+    pub fn new(machine: &Machine, channels: &MakeChannels<'_>) -> Self {
         let kind = match machine.dram {
             DramMachine::Rate {
                 latency,
@@ -78,7 +81,8 @@ impl Dram {
                 reads: VecDeque::new(),
             },
             DramMachine::Banks(config) => {
-                let memory = ClosedLoop::new(&config, machine.line_bytes);
+                let channels = channels(&config);
+                let memory = ClosedLoop::new(channels, &config, machine.line_bytes);
                 Kind::Banks(Box::new(memory), Vec::new())
             }
         };

@@ -35,9 +35,10 @@ mod work;
 
 pub use counts::{CoreCycles, Counts};
 pub use device::{Device, Source};
+pub use dram::MakeChannels;
 pub use figures::{Bound, Energy, Figures};
 pub use machine::{DramModel, Machine, Settings};
-pub use replay::{FrameTime, Point, ReplayError, replay};
+pub use replay::{FrameTime, Point, ReplayError, replay, replay_with};
 pub use timeline::{FrameTimeline, TileSpan};
 pub use work::{Part, Request, Warp};
 

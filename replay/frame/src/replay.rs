@@ -2,6 +2,7 @@
 
 use super::counts::Counts;
 use super::device::Device;
+use super::dram::MakeChannels;
 use super::items::{Items, Pictures};
 use super::machine::{Machine, Settings};
 use super::schedulers::{Inputs, Pressure, Queue, Scheduler, order_of};
@@ -9,6 +10,7 @@ use super::timeline::FrameTimeline;
 use formats::textrace::Tile;
 use rayon::prelude::*;
 use sim::config::{BetweenFrames, ConfigError, RunConfig, accept};
+use sim::memory::dram::Dram;
 use sim::order::{TileRef, WorkItem, frames};
 use sim::stream::{
     Cores, Expander, Frame, FramePlan, LineMemory, StreamError, TileSource, Walk, rendered,
@@ -120,6 +122,21 @@ pub fn replay(
     points: &[Point],
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<FrameTime>, ReplayError> {
+    let channels: &MakeChannels<'_> = &|of| Box::new(Dram::new(of, config.line_bytes));
+    replay_with(trace, config, points, channels, advance)
+}
+
+/// As [`replay`], with other channels of DRAM behind the L2.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_with(
+    trace: &dyn TileSource,
+    config: &RunConfig,
+    points: &[Point],
+    channels: &MakeChannels<'_>,
+    advance: &(dyn Fn(u64) + Sync),
+) -> Result<Vec<FrameTime>, ReplayError> {
     accept(
         config.between_frames == BetweenFrames::Keep,
         "between_frames",
@@ -145,7 +162,7 @@ pub fn replay(
         let frame = walk.expand(number)?;
         let plan = walk.plan(&frame)?;
         runs.par_iter_mut().try_for_each(|run| {
-            run.frame(&rendered, &frame, &plan, &signatures)?;
+            run.frame(&rendered, &frame, &plan, &signatures, channels)?;
             advance(1);
             Ok::<(), ReplayError>(())
         })?;
@@ -197,19 +214,20 @@ impl Run {
         frame: &Frame<'_>,
         plan: &FramePlan<'_>,
         signatures: &Signatures,
+        channels: &MakeChannels<'_>,
     ) -> Result<(), ReplayError> {
         let passes = &source.tables().passes;
         let first = passes.iter().position(|of| of.frame == frame.number());
         self.last.first_pass = first.unwrap_or(0) as u32;
         if self.point.scheduler.row().uses_last_frame && self.out.frames.is_empty() {
             // The first frame has its own counters, as if the head had not moved, like orders that use counters.
-            let mut apart = Device::new(&self.machine)?;
+            let mut apart = Device::new(&self.machine, channels)?;
             self.last = self.phases(&mut apart, source, frame, plan, signatures)?.0;
         }
         let mut device = match self.device.take() {
             Some(device) => device,
             None => {
-                let mut device = Device::new(&self.machine)?;
+                let mut device = Device::new(&self.machine, channels)?;
                 if self.point.records {
                     device.record();
                 }

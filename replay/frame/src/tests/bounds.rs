@@ -1,11 +1,11 @@
 //! Closed forms of single resources, and the bounds that every machine keeps.
 
 use super::*;
-use sim::memory::dram::{Dram, DramConfig, DramPreset};
+use sim::memory::dram::{DramConfig, DramPreset};
 
 /// Cycles of items that run one after the other on one device, after the first ones.
 fn after(machine: &Machine, first: Part, then: Part) -> u64 {
-    let mut device = Device::new(machine).unwrap();
+    let mut device = device(machine);
     device.run(&mut List::shared(vec![first])).unwrap();
     let start = device.now();
     device.run(&mut List::shared(vec![then])).unwrap();

@@ -11,6 +11,7 @@ use super::*;
 use proptest::prelude::*;
 use sim::config::LevelConfig;
 use sim::memory::TICKS;
+use sim::memory::dram::Dram;
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
@@ -79,9 +80,14 @@ impl Source for List {
     }
 }
 
+/// An idle machine.
+fn device(machine: &Machine) -> Device {
+    Device::new(machine, &|of| Box::new(Dram::new(of, machine.line_bytes))).expect("a machine")
+}
+
 /// Cycles and counters of the items.
 fn run(machine: &Machine, mut list: List) -> (u64, Counts) {
-    let mut device = Device::new(machine).expect("a machine");
+    let mut device = device(machine);
     device.run(&mut list).expect("a list");
     (device.now(), device.counts().expect("conserved"))
 }

@@ -19,7 +19,7 @@ mod result;
 #[cfg(test)]
 mod tests;
 
-pub use closed_loop::ClosedLoop;
+pub use closed_loop::{Channels, ClosedLoop};
 pub use mapping::Mapping;
 pub use presets::{Device, DramPreset};
 pub use result::DramResult;
@@ -96,7 +96,7 @@ impl Dram {
         self.requests += bytes.div_ceil(self.line_bytes.into());
         let burst = u64::from(self.device.burst_bytes);
         let clock = cycle.map(|cycle| {
-            let clock = self.clock(cycle) + self.late_by;
+            let clock = self.device.clock(cycle, self.config.core_mhz) + self.late_by;
             self.last = self.last.max(clock);
             self.last
         });
@@ -106,22 +106,9 @@ impl Dram {
         }
     }
 
-    /// The clock of a GPU cycle.
-    fn clock(&self, cycle: u64) -> u64 {
-        let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
-        (ps / u128::from(self.device.clock_ps)) as u64
-    }
-
-    /// Numbers of the bursts of a line.
-    fn bursts(&self, line: u32) -> std::ops::RangeInclusive<u64> {
-        let bytes = u64::from(self.line_bytes);
-        let (first, burst) = (u64::from(line) * bytes, u64::from(self.device.burst_bytes));
-        first / burst..=(first + bytes - 1) / burst
-    }
-
     /// Delays all requests from `cycle` on by the time that requests without a time have taken.
     pub fn catch_up(&mut self, cycle: u64) {
-        let clock = self.clock(cycle);
+        let clock = self.device.clock(cycle, self.config.core_mhz);
         let now = self.channels.iter().map(Channel::now).max().unwrap_or(0);
         self.late_by = self.late_by.max(now.saturating_sub(clock));
     }

@@ -220,6 +220,12 @@ impl Device {
         self.groups * self.banks_of_group
     }
 
+    /// The clock of a cycle at `core_mhz`.
+    pub fn clock(&self, cycle: u64, core_mhz: u32) -> u64 {
+        let ps = u128::from(cycle) * 1_000_000 / u128::from(core_mhz);
+        (ps / u128::from(self.clock_ps)) as u64
+    }
+
     /// Peak bandwidth of a channel's data bus in bytes per second.
     pub fn peak_bytes_per_s(&self) -> f64 {
         f64::from(self.burst_bytes) / (f64::from(self.burst) * f64::from(self.clock_ps) * 1e-12)

@@ -385,7 +385,8 @@ fn a_closed_loop_gives_the_result_of_an_open_one_and_no_answer_is_late() {
         let config = config(preset);
         let line_bytes = 64;
         let mut open = Dram::new(&config, line_bytes);
-        let mut closed = ClosedLoop::new(&config, line_bytes);
+        let channels = Box::new(Dram::new(&config, line_bytes));
+        let mut closed = ClosedLoop::new(channels, &config, line_bytes);
         let mut answered = Vec::new();
         let (mut cycle, mut polled, mut latencies) = (0, 0, Vec::new());
         for number in 0..3000_u64 {
