@@ -1,5 +1,5 @@
 //! Compares the DRAM model with Ramulator (`tests/peers/ramulator`). Runs with PARALLAX_PEERS=1, because
-//! cmake takes about three minutes to build it.
+//! its build takes some minutes.
 
 use parallax_tests::{root, skipped};
 use std::process::Command;
@@ -9,13 +9,13 @@ fn succeeds(command: &mut Command) -> bool {
 }
 
 #[test]
-fn row_hits_and_latencies_match_those_of_ramulator() {
+fn row_hits_latencies_and_frame_times_match_those_of_ramulator() {
     if std::env::var_os("PARALLAX_PEERS").is_none() {
         skipped!("no comparison with Ramulator: PARALLAX_PEERS is not set");
         return;
     }
-    if !succeeds(Command::new("cmake").arg("--version")) {
-        skipped!("cmake is missing, which Ramulator is built with");
+    if !succeeds(Command::new("c++").arg("--version")) {
+        skipped!("c++ is missing, which Ramulator is built with");
         return;
     }
     let manifest = root().join("tests/peers/ramulator/Cargo.toml");
@@ -34,13 +34,16 @@ fn row_hits_and_latencies_match_those_of_ramulator() {
         .parent()
         .and_then(|p| p.parent())
         .expect("a folder");
-    let mut run = cargo("run");
-    run.arg("--release")
-        .arg("--target-dir")
-        .arg(target.join("peers"));
-    let output = run.output().expect("cargo starts");
-    let text = String::from_utf8_lossy(&output.stdout);
-    let messages = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{text}{messages}");
-    assert_eq!(text.lines().count(), 1 + 7, "{text}");
+    let traces = ["atrium", "jungle"].map(|name| root().join(format!("traces/{name}.textrace")));
+    // Streams of requests; then the closed loop: two traces, five memories, two schedulers, two orders.
+    for (traces, rows) in [(&traces[..0], 7), (&traces[..], 2 * 5 * 2 * 2)] {
+        let mut run = cargo("run");
+        run.arg("--release").arg("--target-dir");
+        run.arg(target.join("peers")).arg("--").args(traces);
+        let output = run.output().expect("cargo starts");
+        let text = String::from_utf8_lossy(&output.stdout);
+        let messages = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{text}{messages}");
+        assert_eq!(text.lines().count(), 1 + rows, "{text}");
+    }
 }

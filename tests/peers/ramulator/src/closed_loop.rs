@@ -80,18 +80,14 @@ fn compare(trace: &Textrace, scene: &str, memory: Memory, scheduler: &str) -> Ve
         let hits = |of: &Record| 100.0 * of.result.row_hits as f64 / of.result.reads as f64;
         let is_same = policy == Policy::HitsFirst && !own_timings;
         let text = format!(
-            "{scene},{}{},{count},{},{scheduler},{},{},{apart:.2},{:.1},{:.1},{distance:.3},{:.1},{:.1},{},{}",
+            "{scene},{},{count},{},{},{scheduler},{},{},{apart:.2},{:.1},{:.1},{distance:.3},{:.1},{:.1},{},{}",
             preset.device().name,
-            if own_timings {
-                " (Ramulator's timings)"
-            } else {
-                ""
-            },
             if policy == Policy::HitsFirst {
                 "hits first"
             } else {
                 "cap of 16"
             },
+            if own_timings { "Ramulator's" } else { "ours" },
             ours.0,
             theirs.0,
             ours.1.mean(),
@@ -143,7 +139,7 @@ pub fn run(paths: &[String]) -> bool {
         }
     });
     println!(
-        "scene,DRAM,channels,policy,scheduler,\"cycles, ours\",\"cycles, Ramulator\",\"apart, %\",\"mean latency, ours, clocks\",\
+        "scene,DRAM,channels,order of requests,timings,scheduler,\"cycles, ours\",\"cycles, Ramulator\",\"apart, %\",\"mean latency, ours, clocks\",\
          \"mean latency, Ramulator, clocks\",largest distance,\"row hits, ours, %\",\"row hits, Ramulator, %\",\"reads, ours\",\"reads, Ramulator\""
     );
     let rows = rows.into_inner().expect("no panic");
