@@ -19,10 +19,11 @@ def peer(*traces):
 
 
 def causes(rows):
-    """By device, channels, order of requests and timings: the ranges of all scenes and schedulers."""
+    """By memory, order of requests and timings: the ranges of all scenes and schedulers."""
     groups = {}
-    for _, device, channels, order, timings, _, _, _, apart, _, _, distance, ours, theirs, *_ in rows:
-        group = groups.setdefault((device, channels, order, timings), ([], [], []))
+    for row in rows:
+        _, *memory, _, _, _, apart, _, _, distance, ours, theirs, _, _ = row
+        group = groups.setdefault(tuple(memory), ([], [], []))
         for of, value in zip(group, (float(apart), float(distance), float(ours) - float(theirs))):
             of.append(value)
     for key, (aparts, distances, hits) in groups.items():
@@ -37,10 +38,9 @@ def run(study):
     heading, rows = peer(*traces)
     study.drop(*traces)
     detail = f"tracegen raster SCENE {CAPTURE}"
-    same = [row for row in rows if row[3] == "hits first" and row[4] == "ours"]
-    columns = [at for at in range(len(rows[0])) if at not in (3, 4)]
-    names = heading.split(" | ")
-    study.write("dram-closed-loop", detail, " | ".join(names[at] for at in columns), [[row[at] for at in columns] for row in same])
+    without_settings = lambda row: [*row[:3], *row[7:]]
+    same = [without_settings(row) for row in rows if row[3:7] == ["32", "yes", "hits first", "ours"]]
+    study.write("dram-closed-loop", detail, " | ".join(without_settings(heading.split(" | "))), same)
     study.write(
         "dram-closed-loop-causes", detail,
-        "DRAM | channels | Ramulator's order of requests | timings | cycles apart, % | largest distance | row hits apart, points", causes(rows))
+        "DRAM | channels | queue | writes | Ramulator's order of requests | timings | cycles apart, % | largest distance | row hits apart, points", causes(rows))

@@ -35,8 +35,9 @@ fn row_hits_latencies_and_frame_times_match_those_of_ramulator() {
         .and_then(|p| p.parent())
         .expect("a folder");
     let traces = ["atrium", "jungle"].map(|name| root().join(format!("traces/{name}.textrace")));
-    // Streams of requests; then the closed loop: two traces, five memories, two schedulers, two orders.
-    for (traces, rows) in [(&traces[..0], 7), (&traces[..], 2 * 5 * 2 * 2)] {
+    // Streams of requests; then the closed loop: two traces and two schedulers; three memories with three settings
+    // of the peer, one with six, two with one.
+    for (traces, rows) in [(&traces[..0], 7), (&traces[..], 2 * 2 * (3 * 3 + 6 + 2))] {
         let mut run = cargo("run");
         run.arg("--release").arg("--target-dir");
         run.arg(target.join("peers")).arg("--").args(traces);

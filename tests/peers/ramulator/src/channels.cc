@@ -22,11 +22,11 @@ bool ramulator::warmup_complete = false;
 
 extern "C" struct PeerSettings {
   bool is_lpddr4;
-  // Row hits before misses, and no row is closed that a queued request needs. Otherwise the oldest of the ready
-  // requests first, with at most `cap` hits to a row.
-  bool hits_first;
+  // `Scheduler<T>::Type`.
+  int order;
   unsigned channels, queue, cap;
-  // Clocks, as the fields of `Device`. DDR4 has Ramulator's own ones except `refi`.
+  // Clocks, as the fields of `Device`. DDR4 has Ramulator's own ones except `refi`. Without `burst`, LPDDR4 has its own
+  // ones except `refi`, and `rfc` unless that is 0.
   int burst, cl, rcd, rp, ras, rtp, cwl, wr, wtr, ccd, rrd, faw, rfc, refi;
 };
 
@@ -66,8 +66,7 @@ template <typename T> struct Channels : Peer {
       auto *controller = new Controller<T>(Config(), channel);
       controller->readq.max = controller->writeq.max = of.queue;
       controller->scheduler->cap = of.cap;
-      using Order = typename Scheduler<T>::Type;
-      controller->scheduler->type = of.hits_first ? Order::FRFCFS_PriorHit : Order::FRFCFS_Cap;
+      controller->scheduler->type = typename Scheduler<T>::Type(of.order);
       channels.push_back({controller, {}});
     }
   }
@@ -159,20 +158,22 @@ template <typename T> struct Channels : Peer {
 static Peer *lpddr4(const PeerSettings &of) {
   auto *spec = new LPDDR4("LPDDR4_8Gb_x16", "LPDDR4_3200");
   spec->channel_width = 16;
+  auto &s = spec->speed_entry;
   if (of.burst) {
-    auto &s = spec->speed_entry;
     s.nBL = of.burst, s.nCCD = of.ccd, s.nCL = of.cl, s.nRCD = of.rcd, s.nRPpb = s.nRPab = of.rp;
     s.nRAS = of.ras, s.nRC = of.ras + of.rp, s.nRTP = of.rtp, s.nCWL = of.cwl, s.nWR = of.wr;
-    s.nRRD = of.rrd, s.nFAW = of.faw, s.nRFCab = of.rfc;
+    s.nRRD = of.rrd, s.nFAW = of.faw;
     // Ramulator adds a clock to the first, and the second to a turn from reads to writes.
     s.nWTR = of.wtr - 1, s.nDQSCK = 1, s.nPPD = 1;
     spec->read_latency = of.cl + of.burst;
-    for (auto &level : spec->timing)
-      for (auto &command : level)
-        command.clear();
-    spec->init_timing();
   }
-  return new Channels<LPDDR4>(spec, spec->speed_entry.nCWL + spec->speed_entry.nBL, of);
+  if (of.rfc)
+    s.nRFCab = of.rfc;
+  for (auto &level : spec->timing)
+    for (auto &command : level)
+      command.clear();
+  spec->init_timing();
+  return new Channels<LPDDR4>(spec, s.nCWL + s.nBL, of);
 }
 
 static Peer *ddr4(const PeerSettings &of) {

@@ -5,20 +5,33 @@ use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 
-/// How Ramulator chooses among requests.
+/// How Ramulator chooses among requests: its `Scheduler::Type`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
-    /// Its default: the oldest of the ready requests, with at most 16 hits to a row before older requests.
-    Published,
+    /// The oldest of those whose next command can be issued, which may close a row that others need.
+    OldestFirst = 1,
+    /// Its default: likewise, but after 16 hits to a row older requests go first.
+    Published = 2,
     /// As our model: hits first, and no row is closed that a queued request needs.
-    HitsFirst,
+    HitsFirst = 3,
+}
+
+/// Timings of Ramulator's LPDDR4. Those of DDR4 are equal to ours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timings {
+    /// Those of our device.
+    Ours,
+    /// Its own.
+    Own,
+    /// Its own, with our duration of a refresh.
+    OwnButRefresh,
 }
 
 /// `PeerSettings` of channels.cc.
 #[repr(C)]
 struct Settings {
     is_lpddr4: bool,
-    hits_first: bool,
+    order: i32,
     counts: [u32; 3],
     clocks: [u32; 14],
 }
@@ -40,22 +53,23 @@ pub struct Ramulator(*mut c_void);
 unsafe impl Send for Ramulator {}
 
 impl Ramulator {
-    /// An idle memory. Its timings of LPDDR4 are replaced by ours unless `own_timings`; those of DDR4 are equal.
-    pub fn new(config: &DramConfig, policy: Policy, own_timings: bool) -> Self {
+    /// An idle memory.
+    pub fn new(config: &DramConfig, policy: Policy, timings: Timings) -> Self {
         let is_lpddr4 = match config.preset {
             DramPreset::Lpddr4 => true,
             DramPreset::Ddr4 => false,
             other => panic!("{other:?}: expected lpddr4 or ddr4"),
         };
         let d = config.preset.device();
-        let burst = if own_timings { 0 } else { d.burst };
+        let burst = if timings == Timings::Ours { d.burst } else { 0 };
+        let rfc = if timings == Timings::Own { 0 } else { d.rfc };
         let settings = Settings {
             is_lpddr4,
-            hits_first: policy == Policy::HitsFirst,
+            order: policy as i32,
             counts: [config.channels, config.queue, 16],
             clocks: [
                 burst, d.cl, d.rcd, d.rp, d.ras, d.rtp, d.cwl, d.wr, d.wtr_l, d.ccd_l, d.rrd_l,
-                d.faw, d.rfc, d.refi,
+                d.faw, rfc, d.refi,
             ],
         };
         // SAFETY: the layout is that of channels.cc.

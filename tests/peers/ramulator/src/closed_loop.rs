@@ -1,27 +1,59 @@
 //! Both simulators behind the L2 of `replay schedule`, whose requests depend on earlier answers.
 
-use super::channels::{Policy, Ramulator, Record, Recorded};
+use super::channels::{Policy, Ramulator, Record, Recorded, Timings};
 use formats::textrace::Textrace;
 use frame::schedulers::Scheduler;
 use frame::{Point, Settings, replay_with};
-use sim::config::RunConfig;
+use sim::config::{Mode, RunConfig};
 use sim::memory::dram::{Channels, Dram, DramConfig, DramPreset};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Device, channels, and whether Ramulator keeps its own timings.
-type Memory = (DramPreset, u32, bool);
+/// DRAM, and the bytes that a tile writes per pixel.
+#[derive(Clone, Copy)]
+struct Memory {
+    preset: DramPreset,
+    channels: u32,
+    queue: u32,
+    colour_bytes: u32,
+}
 
-const MEMORIES: [Memory; 5] = [
-    (DramPreset::Ddr4, 1, false),
-    (DramPreset::Ddr4, 2, false),
-    (DramPreset::Lpddr4, 1, false),
-    (DramPreset::Lpddr4, 2, false),
-    (DramPreset::Lpddr4, 2, true),
+const fn memory(preset: DramPreset, channels: u32) -> Memory {
+    Memory {
+        preset,
+        channels,
+        queue: 32,
+        colour_bytes: 4,
+    }
+}
+
+/// The first four have limits.
+const MEMORIES: [Memory; 6] = [
+    memory(DramPreset::Ddr4, 1),
+    memory(DramPreset::Ddr4, 2),
+    memory(DramPreset::Lpddr4, 1),
+    memory(DramPreset::Lpddr4, 2),
+    Memory {
+        colour_bytes: 0,
+        ..memory(DramPreset::Ddr4, 1)
+    },
+    Memory {
+        queue: 512,
+        ..memory(DramPreset::Ddr4, 1)
+    },
 ];
 const SCHEDULERS: [&str; 2] = ["first-idle", "z2-sta"];
-const POLICIES: [Policy; 2] = [Policy::HitsFirst, Policy::Published];
+
+/// What Ramulator is set to. Only the first has limits.
+const VARIANTS: [(Policy, Timings); 6] = [
+    (Policy::HitsFirst, Timings::Ours),
+    (Policy::OldestFirst, Timings::Ours),
+    (Policy::Published, Timings::Ours),
+    (Policy::HitsFirst, Timings::OwnButRefresh),
+    (Policy::HitsFirst, Timings::Own),
+    (Policy::Published, Timings::Own),
+];
 
 /// Largest differences that the test allows with the same policy and timings: cycles in percent, and the distance of
 /// the distributions of latencies.
@@ -33,22 +65,27 @@ type Found = (u64, Record);
 /// Replays a trace with these channels.
 fn simulate(
     trace: &Textrace,
-    (preset, count, _): Memory,
+    memory: Memory,
     scheduler: &str,
     make: impl Fn(&DramConfig, u32) -> Box<dyn Channels> + Sync,
 ) -> Found {
     let dram = DramConfig {
-        preset,
-        channels: count,
+        preset: memory.preset,
+        channels: memory.channels,
+        queue: memory.queue,
         ..DramConfig::default()
     };
     let config = RunConfig {
+        mode: Mode::Functional,
         dram: Some(dram),
         ..RunConfig::default()
     };
     let point = Point {
         scheduler: Scheduler::find(scheduler).expect("a scheduler"),
-        settings: Settings::default(),
+        settings: Settings {
+            colour_bytes: memory.colour_bytes,
+            ..Settings::default()
+        },
         records: false,
     };
     let record = Arc::default();
@@ -65,29 +102,47 @@ fn simulate(
     (cycles, record)
 }
 
-/// A comparison: its row, and whether it holds the limits.
-fn compare(trace: &Textrace, scene: &str, memory: Memory, scheduler: &str) -> Vec<(String, bool)> {
+/// Compares our model with each variant of Ramulator: the rows, and whether they hold the limits.
+fn compare(trace: &Textrace, scene: &str, number: usize, scheduler: &str) -> Vec<(String, bool)> {
+    let memory = MEMORIES[number];
     let ours = simulate(trace, memory, scheduler, |dram, line| {
         Box::new(Dram::new(dram, line))
     });
-    let (preset, count, own_timings) = memory;
-    let row = |policy| {
+    // Both have the same timings of DDR4.
+    let variants = match (memory.preset, memory.channels) {
+        (DramPreset::Lpddr4, 2) => 6,
+        _ if number < 4 => 3,
+        _ => 1,
+    };
+    let row = |variant: usize| {
+        let (policy, timings) = VARIANTS[variant];
         let theirs = simulate(trace, memory, scheduler, |dram, _| {
-            Box::new(Ramulator::new(dram, policy, own_timings))
+            Box::new(Ramulator::new(dram, policy, timings))
         });
         let apart = 100.0 * (ours.0 as f64 / theirs.0 as f64 - 1.0);
         let distance = ours.1.distance(&theirs.1);
         let hits = |of: &Record| 100.0 * of.result.row_hits as f64 / of.result.reads as f64;
-        let is_same = policy == Policy::HitsFirst && !own_timings;
+        let has_limits = number < 4 && variant == 0;
         let text = format!(
-            "{scene},{},{count},{},{},{scheduler},{},{},{apart:.2},{:.1},{:.1},{distance:.3},{:.1},{:.1},{},{}",
-            preset.device().name,
-            if policy == Policy::HitsFirst {
-                "hits first"
+            "{scene},{},{},{},{},{},{},{scheduler},{},{},{apart:.2},{:.1},{:.1},{distance:.3},{:.1},{:.1},{},{}",
+            memory.preset.device().name,
+            memory.channels,
+            memory.queue,
+            if memory.colour_bytes == 0 {
+                "no"
             } else {
-                "cap of 16"
+                "yes"
             },
-            if own_timings { "Ramulator's" } else { "ours" },
+            match policy {
+                Policy::HitsFirst => "hits first",
+                Policy::OldestFirst => "oldest first",
+                Policy::Published => "oldest first after 16 hits",
+            },
+            match timings {
+                Timings::Ours => "ours",
+                Timings::Own => "Ramulator's",
+                Timings::OwnButRefresh => "Ramulator's except tRFC",
+            },
             ours.0,
             theirs.0,
             ours.1.mean(),
@@ -99,10 +154,10 @@ fn compare(trace: &Textrace, scene: &str, memory: Memory, scheduler: &str) -> Ve
         );
         (
             text,
-            !is_same || (apart.abs() <= LIMITS[0] && distance <= LIMITS[1]),
+            !has_limits || (apart.abs() <= LIMITS[0] && distance <= LIMITS[1]),
         )
     };
-    POLICIES.map(row).to_vec()
+    (0..variants).map(row).collect()
 }
 
 /// Prints the comparisons of all traces as CSV. Returns whether all hold the limits.
@@ -114,10 +169,11 @@ pub fn run(paths: &[String]) -> bool {
         (trace, stem.to_string_lossy().into_owned())
     };
     let traces: Vec<(Textrace, String)> = paths.iter().map(open).collect();
-    let jobs: Vec<(&(Textrace, String), Memory, &str)> = traces
+    let jobs: Vec<(&(Textrace, String), usize, &str)> = traces
         .iter()
-        .flat_map(|of| MEMORIES.map(|memory| SCHEDULERS.map(|by| (of, memory, by))))
-        .flatten()
+        .flat_map(|of| {
+            (0..MEMORIES.len()).flat_map(move |memory| SCHEDULERS.map(|by| (of, memory, by)))
+        })
         .collect();
     let (next, rows) = (
         AtomicUsize::new(0),
@@ -139,7 +195,7 @@ pub fn run(paths: &[String]) -> bool {
         }
     });
     println!(
-        "scene,DRAM,channels,order of requests,timings,scheduler,\"cycles, ours\",\"cycles, Ramulator\",\"apart, %\",\"mean latency, ours, clocks\",\
+        "scene,DRAM,channels,queue,writes,order of requests,timings,scheduler,\"cycles, ours\",\"cycles, Ramulator\",\"apart, %\",\"mean latency, ours, clocks\",\
          \"mean latency, Ramulator, clocks\",largest distance,\"row hits, ours, %\",\"row hits, Ramulator, %\",\"reads, ours\",\"reads, Ramulator\""
     );
     let rows = rows.into_inner().expect("no panic");

@@ -7,7 +7,7 @@
 mod channels;
 mod closed_loop;
 
-use channels::{Policy, Ramulator, Record, Recorded};
+use channels::{Policy, Ramulator, Record, Recorded, Timings};
 use sim::memory::dram::{Channels, Dram, DramConfig, DramPreset};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
@@ -156,7 +156,7 @@ fn compare_streams() -> bool {
         let requests = stream();
         let ours = simulate(&requests, |config| Box::new(Dram::new(config, 64)));
         let theirs = simulate(&requests, |config| {
-            Box::new(Ramulator::new(config, Policy::Published, false))
+            Box::new(Ramulator::new(config, Policy::Published, Timings::Ours))
         });
         let hits_apart = 100.0 * (ours.0 - theirs.0) / requests.len() as f64;
         let latency_apart = 100.0 * (ours.1 / theirs.1 - 1.0);
