@@ -25,11 +25,12 @@ WAYS = {"full": ("reference_dram", "reference_tni_cycles"), "reprojected": ("dra
 class Row:
     """A scene, a kind of ray, an L2 and a way: figures of each order, all frames together."""
 
-    def __init__(self, way, runs):
+    def __init__(self, way, runs, simulated):
         dram, cycles = WAYS[way]
         by_frame = {order: [of["result"][dram]["hierarchy_bytes"] for of in frames] for order, frames in runs.items()}
         self.frames = len(by_frame[RULE])
-        self.cycles = {order: sum(of["result"][cycles] for of in frames) for order, frames in runs.items()}
+        self.cycles = {order: mean(of["result"][cycles] for of in frames) for order, frames in runs.items()}
+        self.simulated = {order: result[cycles] for order, result in simulated.items()}
         self.sums = {order: sum(values) for order, values in by_frame.items()}
         self.oracle = sum(map(min, zip(*(by_frame[order] for order in FIXED))))
         self.over = 100 * (self.sums[RULE] / min(self.sums[order] for order in FIXED) - 1)
@@ -37,7 +38,7 @@ class Row:
     def cells(self):
         base = self.sums["morton"]
         return [f"{base / self.frames / 1e6:.3f}", *(saved(self.sums[order], base) for order in [*FIXED[1:], RULE]), saved(self.oracle, base), f"{self.over:.2f}",
-                *(f"{self.cycles[order] / self.frames / 1e3:.1f}" for order in [*FIXED, RULE])]
+                *(f"{self.cycles[order] / 1e3:.1f}" for order in [*FIXED, RULE])]
 
 
 def kept(rows):
@@ -73,7 +74,10 @@ def measure(study, traces, kind, kib):
         runs[order] = [json.loads(line) for line in text.splitlines()]
         if not runs[order][0]["result"]["reference_dram"]["hierarchy_bytes"]:
             return None
-    return {way: Row(way, runs) for way in WAYS}
+    # The cycle-level model supports only frames that start with empty caches.
+    words = ["reproject --rule none --reuse pixel --timing cycle --rays", KINDS[kind], "--config", machine, traces[0], "--order"]
+    simulated = {order: study.json(*words, order)["result"] for order in FIXED}
+    return {way: Row(way, runs, simulated) for way in WAYS}
 
 
 def run(study):
@@ -103,7 +107,7 @@ def run(study):
     names = " | ".join(figures.split(" | ")[:6])
     study.write("ray-orders-scenes", detail, f"scene | rays | tile pair KiB | eyes | {names}", middle, f"L2 of {L2_KIB[1]} KiB")
     share = lambda rows, sums: f"{mean(100 * (1 - sums(row) / row.sums['morton']) for row in rows):.1f}"
-    summary = []
+    summary, cycles = [], []
     for kind in KINDS:
         for kib in L2_KIB:
             for way in WAYS:
@@ -112,9 +116,18 @@ def run(study):
                 worst = max(rows, key=lambda scene: rows[scene].over)
                 summary.append([kind, kib, way, len(rows), *shares, share(rows.values(), lambda row: row.oracle), f"{kept(rows.values()):.0f}",
                                 f"{worst}: {rows[worst].over:.2f}"])
+                cells = []
+                for model, orders in ("cycles", [*FIXED[1:], RULE]), ("simulated", FIXED[1:]):
+                    of_scenes = [getattr(row, model) for row in rows.values()]
+                    cells.append(f"{mean(of['morton'] for of in of_scenes) / 1e3:.1f}")
+                    cells += [f"{mean(100 * (1 - of[order] / of['morton']) for of in of_scenes):.1f}" for order in orders]
+                cycles.append([kind, kib, way, *cells])
     study.write(
         "ray-orders-summary", detail, "rays | L2 KiB | eyes | scenes | LRTA saves % | STA saves % | rule saves % | oracle saves % | of the oracle's bytes, rule % | "
         "rule over the best fixed order, worst scene %", summary)
+    study.write(
+        "ray-orders-cycles", f"{detail}; cycle-level: frame 0 with --timing cycle", "rays | L2 KiB | eyes | closed form: Morton kcycles | LRTA saves % | STA saves % | "
+        "rule saves % | cycle-level: Morton kcycles | cycle-level: LRTA saves % | cycle-level: STA saves %", cycles)
     groups = []
     for group, of_group in GROUPS.items():
         for way in WAYS:

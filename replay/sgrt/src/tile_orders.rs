@@ -4,7 +4,7 @@ use super::cache::{DeviceCaches, Misses};
 use super::config::SgrtConfig;
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{Kept, misses_of};
-use super::order_rules::{Choice, Count, Counted, OrderRule};
+use super::order_rules::{Choice, Count, Counted, OrderRule, Setting};
 use formats::raytrace::RaytraceTables;
 use serde::{Deserialize, Serialize};
 use sim::config::{BetweenFrames, Order};
@@ -169,7 +169,8 @@ impl TileSequence {
         self.frame += 1;
     }
 
-    /// Plans the frame for each run. `source` is read for an order that needs counters.
+    /// Plans the frame for each run, the first of which traces both eyes in full. `source` is read for an order that needs
+    /// counters.
     ///
     /// # Errors
     /// [`FrameError`] for a trace without visits, for another grid than the last frame's, and for an unreadable tile.
@@ -225,7 +226,7 @@ impl TileSequence {
             })?;
             self.counters = Some(own);
         }
-        for (run, (_, config)) in self.runs.iter_mut().zip(runs) {
+        for (number, (run, (_, config))) in self.runs.iter_mut().zip(runs).enumerate() {
             let last = before.as_ref().or(self.counters.as_ref());
             let inputs = PlanInputs {
                 last,
@@ -237,7 +238,11 @@ impl TileSequence {
                 Some(RayOrder::Fixed(order)) => Choice::whole(order),
                 Some(RayOrder::Rule(rule)) => {
                     run.caches.count(tables.tile_count());
-                    (rule.row().choose)(&run.counted, config)
+                    let setting = Setting {
+                        l2_lines: config.cache.l2_bytes / config.cache.line_bytes,
+                        reprojects: number > 0,
+                    };
+                    (rule.row().choose)(&run.counted, &setting)
                 }
             };
             run.plan = plan(run.choice.order);

@@ -1,9 +1,9 @@
 //! Rules that choose the tile order of the next frame from counters of the frames before. One a file, each a row of the
 //! table.
 
+mod alternating;
 mod trials;
 
-use super::config::SgrtConfig;
 use sim::config::Order;
 use sim::registry::Named;
 
@@ -14,14 +14,23 @@ pub struct RuleRow {
     pub name: &'static str,
     /// One line of help.
     pub help: &'static str,
-    /// The orders of the next frame, given the frames before and the machine.
-    pub choose: fn(&[Counted], &SgrtConfig) -> Choice,
+    /// The orders of the next frame, given the frames before.
+    pub choose: fn(&[Counted], &Setting) -> Choice,
 }
 
 /// A rule.
 pub type OrderRule = Named<RuleRow>;
 
 sim::rows! { RuleRow: OrderRule::new(&trials::ROW); }
+
+/// What the driver knows without counters.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Lines of the L2.
+    pub l2_lines: u64,
+    /// True if the right eye reuses the left eye's pixels.
+    pub reprojects: bool,
+}
 
 /// The orders of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,7 @@
 //! Tries other orders, at first on few pairs of tiles, and keeps the order that fetches least. The next trials wait until
-//! the lines that the last ones cost are few beside those of the frames between.
+//! the lines that the last ones cost are few beside those of the frames between. With reprojection, [`alternating`] chooses.
 
-use super::{Choice, Count, Counted, RuleRow};
-use crate::config::SgrtConfig;
+use super::{Choice, Count, Counted, RuleRow, Setting, alternating};
 use sim::config::Order;
 use std::ops::Range;
 
@@ -21,7 +20,8 @@ const CLEAR: f64 = 0.02;
 
 pub(super) const ROW: RuleRow = RuleRow {
     name: "trials",
-    help: "morton, z2-lrta or z2-sta: the one that fetches least when it is tried, first on two quarters of the pairs of tiles",
+    help: "morton, z2-lrta or z2-sta: the one that fetches least when it is tried, first on two quarters of the pairs of tiles; \
+           with reprojection z2-lrta or z2-sta",
     choose,
 };
 
@@ -32,8 +32,11 @@ struct Settled {
     cost: f64,
 }
 
-fn choose(frames: &[Counted], config: &SgrtConfig) -> Choice {
-    let l2_lines = config.cache.l2_bytes / config.cache.line_bytes;
+fn choose(frames: &[Counted], setting: &Setting) -> Choice {
+    let l2_lines = setting.l2_lines;
+    if setting.reprojects {
+        return Choice::whole(alternating::choose(frames, l2_lines));
+    }
     let mut rest = frames;
     while !rest.is_empty() {
         let mut next = Choice::whole(START);
@@ -145,12 +148,14 @@ mod tests {
     /// order of each frame, and the lines that are fetched of 1000 in the mean.
     fn play(l2_lines: u64, fetched: [u64; 3]) -> (Vec<Choice>, f64) {
         let of = |order: Order| fetched[CHOICES.iter().position(|of| *of == order).unwrap()];
-        let mut config = SgrtConfig::default();
-        config.cache.l2_bytes = l2_lines * config.cache.line_bytes;
+        let setting = Setting {
+            l2_lines,
+            reprojects: false,
+        };
         let mut known: Vec<Counted> = Vec::new();
         for _ in 0..FRAMES {
-            let choice = choose(&known, &config);
-            assert_eq!(choice, choose(&known, &config));
+            let choice = choose(&known, &setting);
+            assert_eq!(choice, choose(&known, &setting));
             let part = |part, quarters| {
                 let tried = choice.sampled.filter(|(sample, _)| *sample == part);
                 Count {
