@@ -106,26 +106,29 @@ impl Kernel for Avx2 {
     fn step8(ray: &Ray, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
         // SAFETY: dispatch ensures AVX2. Loads and stores are of whole arrays.
         unsafe {
-            let mut enter = _mm256_set1_ps(ray.t_min);
-            let mut leave = _mm256_set1_ps(t_max);
             let planes = node.bounds.as_ptr().cast::<u8>();
-            for a in 0..3 {
+            let ends = |a: usize| {
                 // The far planes lie beside the near planes.
                 let at = ray.near_at[a];
                 let near_plane = _mm256_load_ps(planes.add(at).cast());
                 let far_plane = _mm256_load_ps(planes.add(at ^ 32).cast());
-                let t0 = _mm256_fmadd_ps(near_plane, ray.near_reciprocal[a], ray.near_shift[a]);
-                let t1 = _mm256_fmadd_ps(far_plane, ray.far_reciprocal[a], ray.far_shift[a]);
-                enter = _mm256_max_ps(enter, t0);
-                leave = _mm256_min_ps(leave, t1);
-            }
+                (
+                    _mm256_fmadd_ps(near_plane, ray.near_reciprocal[a], ray.near_shift[a]),
+                    _mm256_fmadd_ps(far_plane, ray.far_reciprocal[a], ray.far_shift[a]),
+                )
+            };
+            let (x, y, z) = (ends(0), ends(1), ends(2));
+            // In pairs, because the next node waits for the result.
+            let (start, end) = (_mm256_set1_ps(ray.t_min), _mm256_set1_ps(t_max));
+            let enter = _mm256_max_ps(_mm256_max_ps(x.0, y.0), _mm256_max_ps(z.0, start));
+            let leave = _mm256_min_ps(_mm256_min_ps(x.1, y.1), _mm256_min_ps(z.1, end));
             _mm256_store_ps(near.0.as_mut_ptr(), enter);
             _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32
         }
     }
 
     #[inline(always)]
-    fn lines_hit<const NEAR: bool>(ray: &Ray, block: &Block, pad: f32) -> u32 {
+    fn lines_hit(ray: &Ray, block: &Block) -> u32 {
         let [kx, ky, kz] = ray.sheared_at;
         // SAFETY: dispatch ensures AVX2. Loads are of whole arrays.
         unsafe {
@@ -148,23 +151,6 @@ impl Kernel for Avx2 {
             let zero = _mm_setzero_ps();
             let least = _mm_min_ps(_mm_min_ps(u, v), w);
             let most = _mm_max_ps(_mm_max_ps(u, v), w);
-            if NEAR {
-                let sign = _mm_set1_ps(-0.0);
-                let size = [ay, bx, by, cx, cy]
-                    .into_iter()
-                    .fold(_mm_andnot_ps(sign, ax), |size, x| {
-                        _mm_max_ps(size, _mm_andnot_ps(sign, x))
-                    });
-                let pad = _mm_set1_ps(pad);
-                let both = _mm_add_ps(pad, _mm_mul_ps(_mm_set1_ps(f32::EPSILON), size));
-                let sum = _mm_mul_ps(_mm_set1_ps(4.0), _mm_add_ps(size, pad));
-                let margin = _mm_mul_ps(sum, both);
-                let inside = _mm_or_ps(
-                    _mm_cmpge_ps(least, _mm_xor_ps(sign, margin)),
-                    _mm_cmple_ps(most, margin),
-                );
-                return _mm_movemask_ps(inside) as u32;
-            }
             let all = _mm_or_ps(_mm_cmpgt_ps(least, zero), _mm_cmplt_ps(most, zero));
             let mut mask = _mm_movemask_ps(all) as u32;
             // A lane whose product is zero has a zero edge function, which is evaluated exactly.
@@ -186,6 +172,32 @@ impl Kernel for Avx2 {
                 mask |= u32::from(hit) << lane;
             }
             mask
+        }
+    }
+
+    #[inline(always)]
+    fn lines_near(ray: &Ray, blocks: [&Block; 2], pad: f32) -> u32 {
+        // SAFETY: dispatch ensures AVX2.
+        unsafe {
+            let a = sheared(ray, blocks, 0);
+            let b = sheared(ray, blocks, 1);
+            let c = sheared(ray, blocks, 2);
+            let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+            let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
+            let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
+            let sign = _mm256_set1_ps(-0.0);
+            let size = _mm256_max_ps(_mm256_max_ps(larger(a), larger(b)), larger(c));
+            // As `near_margin`, with its factor on one side.
+            let rounding = _mm256_mul_ps(_mm256_set1_ps(4.0 * f32::EPSILON), size);
+            let margin = _mm256_mul_ps(
+                _mm256_add_ps(size, _mm256_set1_ps(pad)),
+                _mm256_add_ps(_mm256_set1_ps(4.0 * pad), rounding),
+            );
+            let inside = _mm256_or_ps(
+                _mm256_cmp_ps::<_CMP_GE_OQ>(least, _mm256_xor_ps(sign, margin)),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(most, margin),
+            );
+            _mm256_movemask_ps(inside) as u32
         }
     }
 
@@ -233,6 +245,56 @@ impl Kernel for Avx2 {
     ) -> Option<f32> {
         // SAFETY: dispatch ensures AVX2.
         unsafe { leaf_out_of_line(test, ray, counter, leaf) }
+    }
+}
+
+/// A vertex of two blocks' triangles in the sheared space.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn sheared(ray: &Ray, blocks: [&Block; 2], vertex: usize) -> [__m256; 2] {
+    let [first, second] = blocks.map(|block| block.vertices[vertex].as_ptr().cast::<f32>());
+    let [kx, ky, kz] = ray.sheared_at;
+    // SAFETY: see above. Loads are of whole arrays.
+    unsafe {
+        let x = _mm256_set_m128(_mm_load_ps(second.add(kx)), _mm_load_ps(first.add(kx)));
+        let y = _mm256_set_m128(_mm_load_ps(second.add(ky)), _mm_load_ps(first.add(ky)));
+        let z = _mm256_set_m128(_mm_load_ps(second.add(kz)), _mm_load_ps(first.add(kz)));
+        let [ox, oy, oz] = ray.origin4;
+        let [sx, sy] = ray.shear4;
+        let z = _mm256_sub_ps(z, _mm256_set_m128(oz, oz));
+        let (x, y) = (
+            _mm256_sub_ps(x, _mm256_set_m128(ox, ox)),
+            _mm256_sub_ps(y, _mm256_set_m128(oy, oy)),
+        );
+        [
+            _mm256_sub_ps(x, _mm256_mul_ps(_mm256_set_m128(sx, sx), z)),
+            _mm256_sub_ps(y, _mm256_mul_ps(_mm256_set_m128(sy, sy), z)),
+        ]
+    }
+}
+
+/// Edge functions.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn edge([px, py]: [__m256; 2], [qx, qy]: [__m256; 2]) -> __m256 {
+    // SAFETY: see above.
+    unsafe { _mm256_sub_ps(_mm256_mul_ps(px, qy), _mm256_mul_ps(py, qx)) }
+}
+
+/// The larger magnitude.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn larger([x, y]: [__m256; 2]) -> __m256 {
+    // SAFETY: see above.
+    unsafe {
+        let sign = _mm256_set1_ps(-0.0);
+        _mm256_max_ps(_mm256_andnot_ps(sign, x), _mm256_andnot_ps(sign, y))
     }
 }
 

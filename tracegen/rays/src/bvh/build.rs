@@ -128,10 +128,7 @@ fn place_leaves(
         leaves[at as usize] = Child::leaf(out.blocks.len() as u32, node.prim_count);
         out.leaves += 1;
         for chunk in members.chunks(BLOCK) {
-            let mut block = Block {
-                vertices: [[[f32::NAN; BLOCK]; 3]; 3],
-                primitives: [u32::MAX; BLOCK],
-            };
+            let mut block = Block::EMPTY;
             for (lane, member) in chunk.iter().enumerate() {
                 block.primitives[lane] = numbers[*member as usize];
                 for (v, vertex) in triangles[*member as usize].iter().enumerate() {

@@ -8,9 +8,9 @@
 
 use super::collapse::MAX_TRIANGLES;
 use super::count::Counter;
-use super::kernel::Kernel;
 use super::leaf::{AnyHit, Closest, LeafTest, Place};
-use super::node::{Block, Child, MASKED};
+use super::kernel::{Ends, Kernel};
+use super::node::{BLOCK, Block, Child, MASKED};
 use super::traverse::{Width, walk};
 use super::{Bvh, BvhError, TreeOptions};
 use crate::ray::{LARGEST_COORDINATE, PreparedRay, Ray};
@@ -151,14 +151,21 @@ impl Instance {
         rounded(sizes.times::<false>((PADS * world).to_array())).into()
     }
 
-    /// A triangle of the mesh in the world, as [`Placement::triangle`] has it.
+    /// Triangles of the mesh in the world, as [`Placement::triangle`] has them.
     #[inline(always)]
-    fn triangle(&self, vertices: Triangle) -> Triangle {
-        let moved = vertices.map(|p| {
-            let world = self.to_world.times::<true>(p);
-            rounded(std::array::from_fn(|i| world[i] - self.origin[i]))
-        });
-        wound(moved, self.mirrored)
+    fn block(&self, block: &Block, out: &mut Block) {
+        let [a, b, c, moved] = &self.to_world.0;
+        for (vertex, [x, y, z]) in block.vertices.iter().enumerate() {
+            let vertex = if self.mirrored { [0, 2, 1][vertex] } else { vertex };
+            for axis in 0..3 {
+                for lane in 0..BLOCK {
+                    let [x, y, z] = [x[lane], y[lane], z[lane]].map(f64::from);
+                    let world = a[axis] * x + b[axis] * y + c[axis] * z + moved[axis];
+                    out.vertices[vertex][axis][lane] = (world - self.origin[axis]) as f32;
+                }
+            }
+        }
+        out.primitives = block.primitives;
     }
 
     /// A ray in the mesh's space.
@@ -345,34 +352,37 @@ impl Below {
 }
 
 /// A leaf test that searches the tree of one instance after the other.
-pub(super) trait Search<'a> {
-    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a>);
+pub(super) trait Search<'a, K: Kernel> {
+    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a, K>);
 }
 
-impl<'a, A> Search<'a> for Closest<'a, A, Moved<'a>> {
-    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a>) {
+impl<'a, K: Kernel, A> Search<'a, K> for Closest<'a, A, Moved<'a, K>> {
+    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a, K>) {
         self.query.enter(bvh, first_slots, place);
     }
 }
 
-impl<'a, A> Search<'a> for AnyHit<'a, A, Moved<'a>> {
-    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a>) {
+impl<'a, K: Kernel, A> Search<'a, K> for AnyHit<'a, A, Moved<'a, K>> {
+    fn enter(&mut self, bvh: &'a Bvh, first_slots: &'a [u32], place: Moved<'a, K>) {
         self.query.enter(bvh, first_slots, place);
     }
 }
 
 /// Triangles of an instance.
-pub(super) struct Moved<'a> {
+pub(super) struct Moved<'a, K: Kernel> {
+    /// The ray in the world.
+    world: &'a K::Ray<'a>,
     instance: &'a Instance,
     first_block: u32,
     /// How far sheared coordinates may be off in the mesh's space.
     sheared_pad: f32,
 }
 
-impl<'a> Moved<'a> {
+impl<'a, K: Kernel> Moved<'a, K> {
     /// Before the first instance.
-    pub fn nowhere(below: &'a Below) -> Self {
+    pub fn nowhere(below: &'a Below, world: &'a K::Ray<'a>) -> Self {
         Self {
+            world,
             instance: &below.instances[0],
             first_block: 0,
             sheared_pad: 0.0,
@@ -380,7 +390,9 @@ impl<'a> Moved<'a> {
     }
 }
 
-impl Place for Moved<'_> {
+impl<K: Kernel> Place<K> for Moved<'_, K> {
+    const BLOCKS: usize = 2;
+
     #[inline(always)]
     fn first_primitive(&self) -> u32 {
         self.instance.first_primitive
@@ -392,32 +404,44 @@ impl Place for Moved<'_> {
     }
 
     #[inline(always)]
-    fn lines_hit<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block) -> u32 {
-        K::lines_hit::<true>(ray, block, self.sheared_pad)
+    fn lines_hit(&self, ray: &K::Ray<'_>, blocks: &[Block]) -> u32 {
+        let pair = [&blocks[0], blocks.get(1).unwrap_or(&blocks[0])];
+        K::lines_near(ray, pair, self.sheared_pad)
     }
 
-    /// The result lies within the slabs of both spaces. No box around the triangle in either
-    /// starts behind it, so hits depend on no order.
+    /// Boxes are those of both spaces. No box around a triangle in either starts behind the result,
+    /// so hits depend on no order.
     #[inline(always)]
-    fn triangle(
+    fn candidates<'b>(
         &self,
-        ray: &PreparedRay<'_>,
-        vertices: Triangle,
-        [near, far]: [f32; 2],
-    ) -> Option<(Triangle, [f32; 2])> {
-        let vertices = self.instance.triangle(vertices);
-        if !ray.line_hits(&vertices) {
-            return None;
+        ray: &K::Ray<'_>,
+        mask: u32,
+        block: &'b Block,
+        t_max: f32,
+        room: &'b mut Block,
+    ) -> (&'b Block, u32, Ends) {
+        let [mut ends, mut world] = [const { Ends([[0.0; BLOCK]; 2]) }; 2];
+        let mut mask = mask & K::boxes_hit(ray, block, t_max, &mut ends);
+        if mask != 0 {
+            self.instance.block(block, room);
+            mask &= K::lines_hit(self.world, room);
+            mask &= K::boxes_hit(self.world, room, t_max, &mut world);
+            let ([near, far], [world_near, world_far]) = (&mut ends.0, &world.0);
+            for lane in 0..BLOCK {
+                let [n, f] = [&mut near[lane], &mut far[lane]];
+                *n = if world_near[lane] > *n { world_near[lane] } else { *n };
+                *f = if world_far[lane] < *f { world_far[lane] } else { *f };
+                mask &= !(u32::from(near[lane] > far[lane]) << lane);
+            }
         }
-        let (world_near, world_far) = ray.triangle_slab(&vertices);
-        let (near, far) = (near.max(world_near), far.min(world_far));
-        (near <= far).then_some((vertices, [near, far]))
+        (room, mask, ends)
     }
 }
 
 /// The leaf test of the upper tree: walks the tree of the leaf's instance.
-pub(super) struct Enter<'a, W, L> {
+pub(super) struct Enter<'a, K: Kernel, W, L> {
     below: &'a Below,
+    world: &'a K::Ray<'a>,
     prepared: &'a PreparedRay<'a>,
     stack: &'a mut Vec<u64>,
     stacked: u32,
@@ -426,15 +450,17 @@ pub(super) struct Enter<'a, W, L> {
     width: PhantomData<W>,
 }
 
-impl<'a, W, L> Enter<'a, W, L> {
+impl<'a, K: Kernel, W, L> Enter<'a, K, W, L> {
     pub fn new(
         below: &'a Below,
+        world: &'a K::Ray<'a>,
         prepared: &'a PreparedRay<'a>,
         stack: &'a mut Vec<u64>,
         search: L,
     ) -> Self {
         Self {
             below,
+            world,
             prepared,
             stack,
             stacked: 0,
@@ -445,7 +471,9 @@ impl<'a, W, L> Enter<'a, W, L> {
     }
 }
 
-impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a>> LeafTest<K> for Enter<'a, W, L> {
+impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a, K>> LeafTest<K>
+    for Enter<'a, K, W, L>
+{
     const LONG: bool = true;
 
     #[inline(always)]
@@ -467,6 +495,7 @@ impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a>> LeafTest<K> for Enter
         let prepared = PreparedRay::with_pad(&ray, tree.bvh.bounds, pad);
         let loaded = K::load(&prepared);
         let place = Moved {
+            world: self.world,
             instance,
             first_block: tree.first_block,
             sheared_pad: prepared.sheared_pad(),

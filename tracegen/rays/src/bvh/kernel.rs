@@ -20,9 +20,11 @@ pub trait Kernel: Copy + Sized {
     fn step2(ray: &Self::Ray<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32);
     /// The eight-box test: entry distances into `near`, and a bit for each child that is hit.
     fn step8(ray: &Self::Ray<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32;
-    /// A bit mask of a block's triangles through which the line passes, with `NEAR` also of those
-    /// that it would pass through after moving sheared vertices by at most `pad`.
-    fn lines_hit<const NEAR: bool>(ray: &Self::Ray<'_>, block: &Block, pad: f32) -> u32;
+    /// A bit mask of a block's triangles through which the line passes.
+    fn lines_hit(ray: &Self::Ray<'_>, block: &Block) -> u32;
+    /// A bit mask of two blocks' triangles through which the line would pass after moving sheared
+    /// vertices by at most `pad`.
+    fn lines_near(ray: &Self::Ray<'_>, blocks: [&Block; 2], pad: f32) -> u32;
     /// Entries and exits of the boxes of a block's triangles, and a bit mask of those whose box is
     /// on the segment up to `t_max`.
     fn boxes_hit(ray: &Self::Ray<'_>, block: &Block, t_max: f32, ends: &mut Ends) -> u32;
@@ -96,16 +98,15 @@ impl Kernel for Scalar {
     }
 
     #[inline]
-    fn lines_hit<const NEAR: bool>(ray: &PreparedRay<'_>, block: &Block, pad: f32) -> u32 {
-        let hit = |lane| {
-            let vertices = block.triangle(lane);
-            if NEAR {
-                ray.line_nears(&vertices, pad)
-            } else {
-                ray.line_hits(&vertices)
-            }
-        };
+    fn lines_hit(ray: &PreparedRay<'_>, block: &Block) -> u32 {
+        let hit = |lane| ray.line_hits(&block.triangle(lane));
         (0..BLOCK).map(|lane| u32::from(hit(lane)) << lane).sum()
+    }
+
+    #[inline]
+    fn lines_near(ray: &PreparedRay<'_>, blocks: [&Block; 2], pad: f32) -> u32 {
+        let near = |at: usize| ray.line_nears(&blocks[at / BLOCK].triangle(at % BLOCK), pad);
+        (0..2 * BLOCK).map(|at| u32::from(near(at)) << at).sum()
     }
 
     #[inline]

@@ -69,26 +69,33 @@ pub trait LeafTest<K: Kernel> {
 }
 
 /// Where the triangles of a tree are.
-pub(super) trait Place {
+pub(super) trait Place<K: Kernel> {
+    /// Blocks that one line test takes.
+    const BLOCKS: usize;
     /// Added to the numbers of primitives.
     fn first_primitive(&self) -> u32;
     /// Added to the numbers of blocks.
     fn first_block(&self) -> u32;
-    /// A bit mask of a block's triangles that the line may hit.
-    fn lines_hit<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block) -> u32;
-    /// A triangle of that mask in the world, and the ends of its box, if the ray hits it.
-    fn triangle(
+    /// A bit mask of the triangles of the first [`Self::BLOCKS`] that the line may hit.
+    fn lines_hit(&self, ray: &K::Ray<'_>, blocks: &[Block]) -> u32;
+    /// The block in the world, and those triangles of a mask that the ray may hit up to `t_max`,
+    /// with the ends of their boxes.
+    fn candidates<'b>(
         &self,
-        ray: &PreparedRay<'_>,
-        vertices: [[f32; 3]; 3],
-        ends: [f32; 2],
-    ) -> Option<([[f32; 3]; 3], [f32; 2])>;
+        ray: &K::Ray<'_>,
+        mask: u32,
+        block: &'b Block,
+        t_max: f32,
+        room: &'b mut Block,
+    ) -> (&'b Block, u32, Ends);
 }
 
 /// Triangles in the world.
 pub(super) struct InPlace;
 
-impl Place for InPlace {
+impl<K: Kernel> Place<K> for InPlace {
+    const BLOCKS: usize = 1;
+
     #[inline(always)]
     fn first_primitive(&self) -> u32 {
         0
@@ -100,18 +107,22 @@ impl Place for InPlace {
     }
 
     #[inline(always)]
-    fn lines_hit<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block) -> u32 {
-        K::lines_hit::<false>(ray, block, 0.0)
+    fn lines_hit(&self, ray: &K::Ray<'_>, blocks: &[Block]) -> u32 {
+        K::lines_hit(ray, &blocks[0])
     }
 
     #[inline(always)]
-    fn triangle(
+    fn candidates<'b>(
         &self,
-        _: &PreparedRay<'_>,
-        vertices: [[f32; 3]; 3],
-        ends: [f32; 2],
-    ) -> Option<([[f32; 3]; 3], [f32; 2])> {
-        Some((vertices, ends))
+        ray: &K::Ray<'_>,
+        mask: u32,
+        block: &'b Block,
+        t_max: f32,
+        _: &'b mut Block,
+    ) -> (&'b Block, u32, Ends) {
+        let mut ends = Ends([[0.0; BLOCK]; 2]);
+        let mask = mask & K::boxes_hit(ray, block, t_max, &mut ends);
+        (block, mask, ends)
     }
 }
 
@@ -132,37 +143,47 @@ impl<'a, A, P> Query<'a, A, P> {
     }
 }
 
-impl<A: AlphaTest, P: Place> Query<'_, A, P> {
-    /// The triangles of a block that the ray may hit up to `t_max`, and the ends of their boxes.
+/// The mask of all triangles of a block.
+const ALL: u32 = (1 << BLOCK) - 1;
+
+impl<A, P> Query<'_, A, P> {
+    /// The line test of a leaf's block, in the lowest bits. `last` is that of the block before.
     #[inline(always)]
-    fn candidates<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block, t_max: f32) -> (u32, Ends) {
-        let mut ends = Ends([[0.0; BLOCK]; 2]);
-        let mut mask = self.place.lines_hit::<K>(ray, block);
-        if mask != 0 {
-            mask &= K::boxes_hit(ray, block, t_max, &mut ends);
+    fn lines_hit<K: Kernel>(
+        &self,
+        ray: &K::Ray<'_>,
+        blocks: &[Block],
+        number: usize,
+        last: u32,
+    ) -> u32
+    where
+        P: Place<K>,
+    {
+        if number.is_multiple_of(P::BLOCKS) {
+            self.place.lines_hit(ray, &blocks[number..])
+        } else {
+            last >> BLOCK
         }
-        (mask, ends)
-    }
-
-    /// Distance and vertices of a candidate, if the ray hits it.
-    #[inline(always)]
-    fn hit(&self, block: &Block, lane: usize, ends: &Ends) -> Option<(f32, [[f32; 3]; 3])> {
-        let ends = ends.0.map(|end| end[lane]);
-        let (vertices, [near, far]) =
-            (self.place).triangle(self.prepared, block.triangle(lane), ends)?;
-        let t = self.prepared.distance_within(&vertices, near, far)?;
-        Some((t, vertices))
-    }
-
-    #[inline(always)]
-    fn primitive(&self, block: &Block, lane: usize) -> u32 {
-        self.place.first_primitive() + (block.primitives[lane] & !MASKED)
     }
 
     /// [`RayHit::place`] of a triangle.
     #[inline(always)]
-    fn place(&self, block: u32, lane: usize) -> u32 {
-        (self.place.first_block() + block) * BLOCK as u32 + lane as u32
+    fn place_of<K: Kernel>(&self, first: u32, number: usize, lane: usize) -> u32
+    where
+        P: Place<K>,
+    {
+        (self.place.first_block() + first + number as u32) * BLOCK as u32 + lane as u32
+    }
+}
+
+impl<A: AlphaTest, P> Query<'_, A, P> {
+    /// Distance and vertices of a candidate, if the ray hits it.
+    #[inline(always)]
+    fn hit(&self, block: &Block, lane: usize, ends: &Ends) -> Option<(f32, [[f32; 3]; 3])> {
+        let [near, far] = ends.0.map(|end| end[lane]);
+        let vertices = block.triangle(lane);
+        let t = self.prepared.distance_within(&vertices, near, far)?;
+        Some((t, vertices))
     }
 
     /// True if a masked triangle stops the ray.
@@ -182,7 +203,7 @@ pub(super) struct Closest<'a, A, P> {
 /// Above the numbers of all primitives.
 const NO_PRIMITIVE: u32 = u32::MAX;
 
-impl<'a, A: AlphaTest, P: Place> Closest<'a, A, P> {
+impl<'a, A, P> Closest<'a, A, P> {
     pub fn new(query: Query<'a, A, P>) -> Self {
         Self {
             best: RayHit {
@@ -200,22 +221,28 @@ impl<'a, A: AlphaTest, P: Place> Closest<'a, A, P> {
     }
 }
 
-impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for Closest<'_, A, P> {
+impl<K: Kernel, A: AlphaTest, P: Place<K>> LeafTest<K> for Closest<'_, A, P> {
     #[inline(always)]
     fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
         let query = &self.query;
         let (first, count) = leaf.leaf_range();
         let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
         counter.triangles(|| query.first_slots[first as usize], count);
-        for (number, block) in (first..).zip(blocks) {
-            let (mut mask, ends) = query.candidates::<K>(ray, block, self.best.t);
+        let (mut lines, mut room) = (0, Block::EMPTY);
+        for (number, block) in blocks.iter().enumerate() {
+            lines = query.lines_hit::<K>(ray, blocks, number, lines);
+            if lines & ALL == 0 {
+                continue;
+            }
+            let (block, mut mask, ends) =
+                (query.place).candidates(ray, lines & ALL, block, self.best.t, &mut room);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
                 let Some((t, vertices)) = query.hit(block, lane, &ends) else {
                     continue;
                 };
-                let primitive = query.primitive(block, lane);
+                let primitive = query.place.first_primitive() + (block.primitives[lane] & !MASKED);
                 if t <= query.prepared.ray.t_min
                     || (t, primitive) >= (self.best.t, self.best.primitive)
                 {
@@ -229,7 +256,7 @@ impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for Closest<'_, A, P> {
                     t,
                     primitive,
                     vertices,
-                    place: query.place(number, lane),
+                    place: query.place_of::<K>(first, number, lane),
                 };
             }
         }
@@ -242,7 +269,7 @@ pub(super) struct AnyHit<'a, A, P> {
     blocker: Option<RayHit>,
 }
 
-impl<'a, A: AlphaTest, P: Place> AnyHit<'a, A, P> {
+impl<'a, A, P> AnyHit<'a, A, P> {
     pub fn new(query: Query<'a, A, P>) -> Self {
         Self {
             query,
@@ -255,7 +282,7 @@ impl<'a, A: AlphaTest, P: Place> AnyHit<'a, A, P> {
     }
 }
 
-impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for AnyHit<'_, A, P> {
+impl<K: Kernel, A: AlphaTest, P: Place<K>> LeafTest<K> for AnyHit<'_, A, P> {
     #[inline(always)]
     fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
         let query = &self.query;
@@ -263,8 +290,14 @@ impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for AnyHit<'_, A, P> {
         let (first, count) = leaf.leaf_range();
         let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
         let first_slot = || query.first_slots[first as usize];
+        let (mut lines, mut room) = (0, Block::EMPTY);
         for (number, block) in blocks.iter().enumerate() {
-            let (mut mask, ends) = query.candidates::<K>(ray, block, t_max);
+            lines = query.lines_hit::<K>(ray, blocks, number, lines);
+            if lines & ALL == 0 {
+                continue;
+            }
+            let (block, mut mask, ends) =
+                (query.place).candidates(ray, lines & ALL, block, t_max, &mut room);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
@@ -274,7 +307,7 @@ impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for AnyHit<'_, A, P> {
                 if t <= t_min || t > t_max {
                     continue;
                 }
-                let primitive = query.primitive(block, lane);
+                let primitive = query.place.first_primitive() + (block.primitives[lane] & !MASKED);
                 let masked = block.primitives[lane] & MASKED != 0;
                 if masked && !query.opaque(counter, primitive, &vertices) {
                     continue;
@@ -284,7 +317,7 @@ impl<K: Kernel, A: AlphaTest, P: Place> LeafTest<K> for AnyHit<'_, A, P> {
                     t,
                     primitive,
                     vertices,
-                    place: query.place(first + number as u32, lane),
+                    place: query.place_of::<K>(first, number, lane),
                 });
                 return None;
             }

@@ -81,6 +81,12 @@ pub struct Block {
 pub const MASKED: u32 = 1 << 31;
 
 impl Block {
+    /// No triangles.
+    pub const EMPTY: Self = Self {
+        vertices: [[[f32::NAN; BLOCK]; 3]; 3],
+        primitives: [u32::MAX; BLOCK],
+    };
+
     /// The vertices of a triangle.
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {

@@ -339,15 +339,15 @@ pub(super) fn search_below<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter>
         first_slots: W::first_slots(bvh),
         prepared: &prepared,
         alpha: &alpha,
-        place: Moved::nowhere(below),
+        place: Moved::<K>::nowhere(below, &loaded),
     };
     let (entries, inner) = (&mut stack.entries, &mut stack.below);
     if ANY_HIT {
-        let mut enter = Enter::<W, _>::new(below, &prepared, inner, AnyHit::new(query));
+        let mut enter = Enter::<K, W, _>::new(below, &loaded, &prepared, inner, AnyHit::new(query));
         walk::<K, W::Upper, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
         enter.search.hit()
     } else {
-        let mut enter = Enter::<W, _>::new(below, &prepared, inner, Closest::new(query));
+        let mut enter = Enter::<K, W, _>::new(below, &loaded, &prepared, inner, Closest::new(query));
         walk::<K, W::Upper, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
         enter.search.hit()
     }
