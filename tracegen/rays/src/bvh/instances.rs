@@ -8,8 +8,8 @@
 
 use super::collapse::MAX_TRIANGLES;
 use super::count::Counter;
-use super::leaf::{AnyHit, Closest, LeafTest, Place};
 use super::kernel::{Ends, Kernel};
+use super::leaf::{AnyHit, Closest, LeafTest, Place};
 use super::node::{BLOCK, Block, Child, MASKED};
 use super::traverse::{Width, walk};
 use super::{Bvh, BvhError, TreeOptions};
@@ -156,7 +156,11 @@ impl Instance {
     fn block(&self, block: &Block, out: &mut Block) {
         let [a, b, c, moved] = &self.to_world.0;
         for (vertex, [x, y, z]) in block.vertices.iter().enumerate() {
-            let vertex = if self.mirrored { [0, 2, 1][vertex] } else { vertex };
+            let vertex = if self.mirrored {
+                [0, 2, 1][vertex]
+            } else {
+                vertex
+            };
             for axis in 0..3 {
                 for lane in 0..BLOCK {
                     let [x, y, z] = [x[lane], y[lane], z[lane]].map(f64::from);
@@ -428,10 +432,16 @@ impl<K: Kernel> Place<K> for Moved<'_, K> {
             mask &= K::boxes_hit(self.world, room, t_max, &mut world);
             let ([near, far], [world_near, world_far]) = (&mut ends.0, &world.0);
             for lane in 0..BLOCK {
-                let [n, f] = [&mut near[lane], &mut far[lane]];
-                *n = if world_near[lane] > *n { world_near[lane] } else { *n };
-                *f = if world_far[lane] < *f { world_far[lane] } else { *f };
-                mask &= !(u32::from(near[lane] > far[lane]) << lane);
+                near[lane] = if world_near[lane] > near[lane] {
+                    world_near[lane]
+                } else {
+                    near[lane]
+                };
+                far[lane] = if world_far[lane] < far[lane] {
+                    world_far[lane]
+                } else {
+                    far[lane]
+                };
             }
         }
         (room, mask, ends)
@@ -471,9 +481,7 @@ impl<'a, K: Kernel, W, L> Enter<'a, K, W, L> {
     }
 }
 
-impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a, K>> LeafTest<K>
-    for Enter<'a, K, W, L>
-{
+impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a, K>> LeafTest<K> for Enter<'a, K, W, L> {
     const LONG: bool = true;
 
     #[inline(always)]

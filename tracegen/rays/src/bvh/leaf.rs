@@ -59,6 +59,8 @@ impl AlphaTest for AllOpaque {
 pub trait LeafTest<K: Kernel> {
     /// Whether the test is too long to be inlined into any traversal.
     const LONG: bool = false;
+    /// Whether to load children ahead that are visited later.
+    const LOADS_AHEAD: bool = true;
     /// Tests a leaf and returns the new `t_max`, or `None` to stop.
     fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32>;
     /// Called before each test with the number of entries on the stack.
@@ -181,6 +183,9 @@ impl<A: AlphaTest, P> Query<'_, A, P> {
     #[inline(always)]
     fn hit(&self, block: &Block, lane: usize, ends: &Ends) -> Option<(f32, [[f32; 3]; 3])> {
         let [near, far] = ends.0.map(|end| end[lane]);
+        if near > far {
+            return None;
+        }
         let vertices = block.triangle(lane);
         let t = self.prepared.distance_within(&vertices, near, far)?;
         Some((t, vertices))
@@ -283,6 +288,9 @@ impl<'a, A, P> AnyHit<'a, A, P> {
 }
 
 impl<K: Kernel, A: AlphaTest, P: Place<K>> LeafTest<K> for AnyHit<'_, A, P> {
+    // Few are visited.
+    const LOADS_AHEAD: bool = P::BLOCKS == 1;
+
     #[inline(always)]
     fn test<C: Counter>(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
         let query = &self.query;

@@ -60,7 +60,7 @@ pub trait Width {
     fn first_slots(bvh: &Bvh) -> &[u32];
 
     /// Visits an inner node: pushes its hit children except for the nearest, which it returns.
-    fn visit<K: Kernel>(
+    fn visit<K: Kernel, L: LeafTest<K>>(
         bvh: &Bvh,
         ray: &K::Ray<'_>,
         node: u32,
@@ -84,7 +84,7 @@ impl Width for Two {
     }
 
     #[inline(always)]
-    fn visit<K: Kernel>(
+    fn visit<K: Kernel, L: LeafTest<K>>(
         bvh: &Bvh,
         ray: &K::Ray<'_>,
         node: u32,
@@ -131,7 +131,14 @@ fn keep_branch() {
 /// Starts to load a child of a wide node that is visited later, if at all. Gains 1 to 5 %; loading
 /// all its lines gains less, and so does loading the child that is visited next.
 #[inline(always)]
-fn load_ahead<K: Kernel, const UPPER: bool>(bvh: &Bvh, nodes: &[Node8], child: Child) {
+fn load_ahead<K: Kernel, L: LeafTest<K>, const UPPER: bool>(
+    bvh: &Bvh,
+    nodes: &[Node8],
+    child: Child,
+) {
+    if !L::LOADS_AHEAD {
+        return;
+    }
     let at = if child.is_leaf() {
         let (block, _) = child.leaf_range();
         match &bvh.below {
@@ -168,7 +175,7 @@ impl<const ON_DEMAND: bool, const UPPER: bool> Width for Wide<ON_DEMAND, UPPER> 
     }
 
     #[inline(always)]
-    fn visit<K: Kernel>(
+    fn visit<K: Kernel, L: LeafTest<K>>(
         bvh: &Bvh,
         ray: &K::Ray<'_>,
         node: u32,
@@ -202,12 +209,12 @@ impl<const ON_DEMAND: bool, const UPPER: bool> Width for Wide<ON_DEMAND, UPPER> 
         if mask == 0 {
             *top = base + 1;
             if near <= near1 {
-                load_ahead::<K, UPPER>(bvh, nodes, child1);
+                load_ahead::<K, L, UPPER>(bvh, nodes, child1);
                 stack[base] = pack(near1, child1);
                 return Some(child);
             }
             keep_branch();
-            load_ahead::<K, UPPER>(bvh, nodes, child);
+            load_ahead::<K, L, UPPER>(bvh, nodes, child);
             stack[base] = pack(near, child);
             return Some(child1);
         }
@@ -218,7 +225,7 @@ impl<const ON_DEMAND: bool, const UPPER: bool> Width for Wide<ON_DEMAND, UPPER> 
         let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
         let (mut nearest, b) = ordered(a, b);
         for pushed in [b, c] {
-            load_ahead::<K, UPPER>(bvh, nodes, unpack(pushed).1);
+            load_ahead::<K, L, UPPER>(bvh, nodes, unpack(pushed).1);
         }
         stack[base] = c;
         stack[base + 1] = b;
@@ -230,7 +237,7 @@ impl<const ON_DEMAND: bool, const UPPER: bool> Width for Wide<ON_DEMAND, UPPER> 
             let entry = pack(lanes.0[lane], node.children[lane]);
             let pushed = nearest.max(entry);
             nearest = nearest.min(entry);
-            load_ahead::<K, UPPER>(bvh, nodes, unpack(pushed).1);
+            load_ahead::<K, L, UPPER>(bvh, nodes, unpack(pushed).1);
             let mut at = *top;
             *top += 1;
             while at > base && stack[at - 1] < pushed {
@@ -270,7 +277,7 @@ pub(super) fn walk<K: Kernel, W: Width, C: Counter, L: LeafTest<K>>(
             None
         } else {
             counter.step(at.0);
-            let next = W::visit::<K>(bvh, ray, at.0, t_max, entries, &mut top);
+            let next = W::visit::<K, L>(bvh, ray, at.0, t_max, entries, &mut top);
             counter.stacked(top as u32);
             next
         };
@@ -347,7 +354,8 @@ pub(super) fn search_below<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter>
         walk::<K, W::Upper, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
         enter.search.hit()
     } else {
-        let mut enter = Enter::<K, W, _>::new(below, &loaded, &prepared, inner, Closest::new(query));
+        let mut enter =
+            Enter::<K, W, _>::new(below, &loaded, &prepared, inner, Closest::new(query));
         walk::<K, W::Upper, C, _>(bvh, &loaded, ray.t_max, entries, counter, &mut enter);
         enter.search.hit()
     }
