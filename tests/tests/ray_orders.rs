@@ -156,6 +156,9 @@ fn the_rule_finds_the_best_order_of_equal_frames() {
         };
         assert_eq!(choices(&chosen), choices(&run("trials", "1")));
         assert_eq!(chosen[1]["config"]["tiles"]["tried"][0], "z2-lrta");
+        // Both eyes in full, and with reprojection.
+        let starts = &chosen[0]["config"]["tiles"]["chosen"];
+        assert_eq!([&starts[0], &starts[1]], ["z2-sta", "z2-lrta"]);
     }
 }
 
