@@ -56,7 +56,9 @@ pub fn replayed(traffic: &Traffic) -> Vec<String> {
         size(*texture_mb),
         share.unwrap_or_default()
     )];
-    if texture_mb <= bound_mb {
+    if *texture_mb <= 0.0 {
+        out.push("The trace samples no texture.".to_owned());
+    } else if texture_mb <= bound_mb {
         out.push("The L2 holds everything; no order can save.".to_owned());
     }
     out
@@ -217,6 +219,8 @@ mod tests {
         assert!(text[0].contains("10.0 kB"), "{text:?}");
         assert!(text[1].contains("no order can save"), "{text:?}");
         assert!(text[0].contains("10.0 % of the frame's"), "{text:?}");
+        (traffic.texture_mb, traffic.bound_mb) = (0.0, 0.0);
+        assert_eq!(replayed(&traffic)[1], "The trace samples no texture.");
     }
 
     #[test]
