@@ -1,6 +1,6 @@
 """Trees of instances in the ray tracer: hits against the flattened scene, memory of a forest, and speed beside Embree's instancing.
 
-`speed` needs the Python package embreex, whose library it calls directly. It measures processor time, but other programs still share the caches.
+`speed` needs the Python package embreex, whose library it calls directly: leave the machine to it.
 """
 
 import importlib.util

@@ -10,13 +10,13 @@ from .apps import found, install
 
 OPTIONS = {"--splats": dict(type=int, default=20000, help="splats of the generated room (20000)")}
 WEBXR = "--iwer node_modules/iwer/build/iwer.min.js --eyes halves"
-# Value of `viewer` in the page's query, package, more options of `tracegen page`, where the viewer sorts.
+# Value of `viewer` in the page's query, package, more options of `tracegen page`.
 VIEWERS = [
-    ("spark", "@sparkjsdev/spark", WEBXR, "processor (worker)"),
-    ("gaussian-splats-3d", "@mkkellogg/gaussian-splats-3d", WEBXR, "processor (worker)"),
-    ("babylon", "@babylonjs/core", "", "processor (worker)"),
+    ("spark", "@sparkjsdev/spark", WEBXR),
+    ("gaussian-splats-3d", "@mkkellogg/gaussian-splats-3d", WEBXR),
+    ("babylon", "@babylonjs/core", ""),
 ]
-COLUMNS = ("viewer | version | pixels per eye | sorts on the | draws of both eyes | vertices | of them per draw | reads per vertex | vertex reads | fragments | "
+COLUMNS = ("viewer | version | pixels per eye | draws of both eyes | vertices | of them per draw | reads per vertex | vertex reads | fragments | "
            "fragments per pixel | draws equal to their query | draws that differ")
 
 
@@ -26,7 +26,7 @@ def run(study):
     install(site)
     packages = json.loads((site / "package-lock.json").read_text())["packages"]
     rows = []
-    for viewer, package, more, sorts in VIEWERS:
+    for viewer, package, more in VIEWERS:
         study.say(viewer)
         trace = study.work / f"{viewer}.textrace"
         query = f"?viewer={viewer}&splats={study.options.splats}"
@@ -37,6 +37,6 @@ def run(study):
         reads = [tuple(map(int, of)) for of in re.findall(r"reads by vertex shaders of .* \((\d+) draws, (\d+) vertices, (\d+) reads", said)]
         [(draws, vertices)] = {of[:2] for of in reads}
         each = sum(of[2] for of in reads)
-        rows.append([viewer, packages[f"node_modules/{package}"]["version"], f"{width}x{height}", sorts, draws, vertices, f"{vertices / draws:.0f}",
+        rows.append([viewer, packages[f"node_modules/{package}"]["version"], f"{width}x{height}", draws, vertices, f"{vertices / draws:.0f}",
                      f"{each / vertices:.0f}", each, fragments, f"{fragments / (2 * width * height):.1f}", equal, different])
     study.write("splats", f"tracegen page --check --frames 30 splats.html; {study.options.splats} splats", COLUMNS, rows)

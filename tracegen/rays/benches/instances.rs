@@ -4,7 +4,7 @@
 //! `hits` compares `--count` rays (a million) for each way to place instances. `memory` and `speed`
 //! use a forest of `--count` instances (10,000) of a tree of 20,000 triangles. `speed` needs Embree 4
 //! as a dynamic library (the Python package embreex has one); both take turns on each stream of
-//! single rays, and the best round counts, in processor time of the thread (Linux). Results are JSON, a line each. The exit code is 1 if a
+//! single rays, and the best round counts. Results are JSON, a line each. The exit code is 1 if a
 //! hit differs without a cause.
 
 use embree::{Embree, Forest};
@@ -278,7 +278,7 @@ fn speed(count: usize, rounds: usize, library: &str) -> anyhow::Result<()> {
         for round in 0..rounds {
             for (slice, best_s) in slices.iter().zip(&mut best_s) {
                 for program in 0..4 {
-                    let start_s = processor_s();
+                    let start = Instant::now();
                     let found = match KINDS.get(program) {
                         Some(kind) => ours(&bvh, *kind, any_hit, slice),
                         None => {
@@ -286,7 +286,7 @@ fn speed(count: usize, rounds: usize, library: &str) -> anyhow::Result<()> {
                             slice.iter().filter(|ray| peer.hits(ray, any_hit)).count()
                         }
                     };
-                    best_s[program] = best_s[program].min(processor_s() - start_s);
+                    best_s[program] = best_s[program].min(start.elapsed().as_secs_f64());
                     hits[program] += if round == 0 { found } else { 0 };
                 }
             }
@@ -320,18 +320,6 @@ fn speed(count: usize, rounds: usize, library: &str) -> anyhow::Result<()> {
         );
     }
     Ok(())
-}
-
-/// Processor time of this thread. Wall time would include that of other programs.
-fn processor_s() -> f64 {
-    const THREAD: i32 = 3;
-    unsafe extern "C" {
-        fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
-    }
-    let mut time = [0; 2];
-    // SAFETY: a `timespec` of 64-bit Linux is two numbers of 64 bits.
-    unsafe { clock_gettime(THREAD, &raw mut time) };
-    time[0] as f64 + time[1] as f64 * 1e-9
 }
 
 fn ours(bvh: &Bvh, kind: TraversalKind, any_hit: bool, rays: &[Ray]) -> usize {
