@@ -156,7 +156,7 @@ impl TileSequence {
             between_frames: self.between.map(|between| between.to_string()),
             frame: self.frame,
             chosen: [0, 1, 2].map(|run| name(of_run(run).choice.order)),
-            tried: [0, 1, 2].map(|run| of_run(run).choice.sampled.map(|(_, order)| name(order))),
+            tried: [0, 1, 2].map(|run| of_run(run).choice.sampled.map(name)),
         })
     }
 
@@ -246,9 +246,9 @@ impl TileSequence {
                 }
             };
             run.plan = plan(run.choice.order);
-            if let Some((sample, tried)) = run.choice.sampled {
+            if let Some(tried) = run.choice.sampled {
                 let parts = parts(tables);
-                let is_sampled = |tile: u32| parts[tile as usize] == sample;
+                let is_sampled = |tile: u32| parts[tile as usize] == 0;
                 run.plan = run.plan.with_tiles_of(&plan(tried), is_sampled);
             }
         }
@@ -290,7 +290,7 @@ impl TileSequence {
         if let Some(RayOrder::Rule(_)) = self.order {
             let part_of = parts(&frame.tables);
             for run in &mut self.runs {
-                let mut parts = [Count::default(); Counted::SAMPLES + 1];
+                let mut parts = [Count::default(); 2];
                 for (count, part) in run.caches.take_counted().iter().zip(&part_of) {
                     parts[*part].add(count);
                 }
@@ -313,17 +313,17 @@ mod tests {
         let tables = frame(&[], View::default()).tables;
         let parts = parts(&tables);
         let size = |part| parts.iter().filter(|of| **of == part).count();
-        assert_eq!([0, 1, 2].map(size), [4, 4, 7]);
+        assert_eq!([0, 1].map(size), [4, 11]);
         let plan = |order| RayPlan::new(order, &PlanInputs::default(), &tables, 0);
         let choices = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
         for (order, tried) in choices.into_iter().flat_map(|a| choices.map(|b| (a, b))) {
-            let mixed = plan(order).with_tiles_of(&plan(tried), |tile| parts[tile as usize] == 1);
+            let mixed = plan(order).with_tiles_of(&plan(tried), |tile| parts[tile as usize] == 0);
             let mut tiles: Vec<_> = mixed.batches().flat_map(tiles_of).collect();
             tiles.sort_unstable_by_key(|at| (at.pass, at.tile));
             let all = (0..2).flat_map(|pass| (0..15).map(move |tile| (pass, tile)));
             assert!(all.eq(tiles.iter().map(|at| (at.pass, at.tile))));
             for item in mixed.batches().flatten() {
-                let of_pair = parts[item.tiles().next().unwrap().tile as usize] == 1;
+                let of_pair = parts[item.tiles().next().unwrap().tile as usize] == 0;
                 let expected = if of_pair { tried } else { order } == Order::Z2_STA;
                 assert_eq!(matches!(item, WorkItem::Pair(..)), expected);
             }

@@ -1,7 +1,6 @@
 //! Rules that choose the tile order of the next frame from counters of the frames before. One a file, each a row of the
 //! table.
 
-mod alternating;
 mod trials;
 
 use sim::config::Order;
@@ -37,8 +36,8 @@ pub struct Setting {
 pub struct Choice {
     /// Of all pairs of tiles, except those of a sample.
     pub order: Order,
-    /// A sample whose pairs have another order, and that order. It must trace a pair's tiles together.
-    pub sampled: Option<(usize, Order)>,
+    /// The order of the sampled pairs, if it is another one. It must trace a pair's tiles together.
+    pub sampled: Option<Order>,
 }
 
 impl Choice {
@@ -78,19 +77,17 @@ impl Count {
 pub struct Counted {
     /// Its orders.
     pub choice: Choice,
-    /// The samples, and then the other pairs.
-    pub parts: [Count; Self::SAMPLES + 1],
+    /// The sampled pairs and the other pairs.
+    pub parts: [Count; 2],
 }
 
 impl Counted {
-    /// Samples of pairs of tiles.
-    pub const SAMPLES: usize = 2;
-    /// The share of each in all pairs.
+    /// The share of the sample in all pairs.
     pub const SAMPLE_SHARE: f64 = 0.25;
 
     /// The part of the pair with a number on the Morton curve. Neighbours are sampled together.
     pub fn part_of(number: usize) -> usize {
-        [0, 0, 2, 2, 1, 1, 2, 2][number % 8]
+        usize::from(number % 8 > 1)
     }
 
     /// Fetched lines of the whole frame.

@@ -1,141 +1,176 @@
-//! Tries other orders, at first on few pairs of tiles, and keeps the order that fetches least. The next trials wait until
-//! the lines that the last ones cost are few beside those of the frames between. With reprojection, [`alternating`] chooses.
+//! Tries other orders and keeps the one that fetches least. Consecutive frames often differ by more than orders do, so
+//! frames of both orders alternate, and the differences are added up until one order is clearly better.
 
-use super::{Choice, Count, Counted, RuleRow, Setting, alternating};
+use super::{Choice, Count, Counted, RuleRow, Setting};
 use sim::config::Order;
-use std::ops::Range;
 
-/// Orders in which they are tried. The first wins if several fetch equally.
-const CHOICES: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
-/// The order of the first frame.
+/// The first order of sequences that trace both eyes in full: where the eyes share much, a frame in another order costs most.
 const START: Order = Order::Z2_STA;
-/// Most lines that trials cost, as a share of the lines of all frames.
-const BUDGET: f64 = 1.0 / 400.0;
-/// Least frames between two rounds of trials.
-const LEAST_WAIT: usize = 4;
-/// A whole frame is traced in an order whose sampled pairs fetch at most so many times the lines of the current order.
-const LARGEST_RISK: f64 = 1.05;
-/// With a smaller difference, the frame after a trial is compared as well, because frames differ by themselves.
-const CLEAR: f64 = 0.02;
+/// The same with reprojection. This order loses least where few right rays are left.
+const START_REPROJECTED: Order = Order::Z2_LRTA;
+/// The sum of differences above which the other order is rejected, and the one below which it replaces the current one.
+const WORSE: f64 = 0.01;
+const BETTER: f64 = -0.06;
+/// The same for a sum whose last difference has no frame of the current order after it yet.
+const CLEARLY_WORSE: f64 = 0.06;
+const CLEARLY_BETTER: f64 = -0.05;
+/// Whole frames of the other order in a round. After them, the sign of the sum decides.
+const MOST_TRIALS: u32 = 3;
+/// A whole frame is traced in an order whose sampled pairs fetch at most so much more (logarithm).
+const LARGEST_RISK: f64 = 0.05;
+/// Least frames between two rounds, and before the first one with `morton`, which loses much where the eyes share much.
+const LEAST_WAIT: usize = 8;
+const FIRST_MORTON: usize = 14;
+/// Most lines that the trials of an order cost, as a share of the lines until its next trial.
+const BUDGET: f64 = 1.0 / 1600.0;
+/// The first frame is compared if it fetches so many times the lines of the L2, because a frame that starts with empty
+/// caches fetches at most the lines of one L2 more.
+const COLD_FRAME_L2S: u64 = 2;
 
 pub(super) const ROW: RuleRow = RuleRow {
     name: "trials",
-    help: "morton, z2-lrta or z2-sta: the one that fetches least when it is tried, first on two quarters of the pairs of tiles; \
-           with reprojection z2-lrta or z2-sta",
+    help: "morton, z2-lrta or z2-sta: the one that fetches least when it is tried; morton for frames that fit into the L2",
     choose,
 };
 
-/// The end of a round of trials.
-struct Settled {
-    order: Order,
-    /// Lines that the trials fetched more than the current order would have, in frames of that order.
+/// A round of trials of another order.
+struct Round {
+    other: Order,
+    /// The frames so far that have the other order, whole or in the sample.
+    trials: Vec<usize>,
+}
+
+/// The result of a round.
+struct Decided {
+    replaces: bool,
+    /// Lines that the trials fetched more, in frames of the current order.
     cost: f64,
 }
 
 fn choose(frames: &[Counted], setting: &Setting) -> Choice {
-    let l2_lines = setting.l2_lines;
+    let start = if setting.reprojects {
+        START_REPROJECTED
+    } else {
+        START
+    };
+    let is_small = |of: &Counted| of.fetched() <= setting.l2_lines;
+    // The first frame in which an order may be tried. With both eyes in full, `morton` is never much better.
+    let mut due = vec![(Order::Z2_LRTA, 1), (Order::Z2_STA, 1)];
     if setting.reprojects {
-        return Choice::whole(alternating::choose(frames, l2_lines));
+        due.push((Order::MORTON, FIRST_MORTON));
     }
-    let mut rest = frames;
-    while !rest.is_empty() {
-        let mut next = Choice::whole(START);
-        let settled = (1..=rest.len()).find_map(|known| match trial(&rest[..known], l2_lines) {
-            Ok(settled) => Some((known, settled)),
-            Err(choice) => {
-                next = choice;
-                None
-            }
-        });
-        let Some((known, Settled { order, cost })) = settled else {
-            return next;
-        };
-        // The last frame that waits is the first one of the next round.
-        let wait = LEAST_WAIT.max((cost / BUDGET).ceil() as usize);
-        match rest.get(known + wait - 1..) {
-            Some(following) if !following.is_empty() => rest = following,
-            _ => return Choice::whole(order),
-        }
-    }
-    Choice::whole(START)
-}
-
-/// The next trial of a round, whose first frame has the current order alone.
-fn trial(frames: &[Counted], l2_lines: u64) -> Result<Settled, Choice> {
-    let current = frames[0].choice.order;
-    let now = frames.iter().rfind(|of| of.choice.order == current);
-    let now = now.unwrap_or(&frames[0]);
-    // Then the L2 keeps most of a frame's lines until the next frame, and neighbours on the curve matter more than the
-    // other eye. Otherwise, `morton` is hardly better than `z2-lrta`, and often much worse.
-    let is_small = now.fetched() <= l2_lines;
-    let (mut best, mut least, mut cost) = (current, 1.0, 0.0);
-    'orders: for order in CHOICES.into_iter().filter(|order| *order != current) {
-        if order == Order::MORTON && !is_small {
+    let (mut current, mut round) = (start, None::<Round>);
+    for (at, frame) in frames.iter().enumerate() {
+        if is_small(frame) {
+            round = None;
             continue;
         }
-        let mut sum = 0.0;
-        for sample in 0..if is_small { 0 } else { Counted::SAMPLES } {
-            let trial = Choice {
-                order: current,
-                sampled: Some((sample, order)),
-            };
-            let Some(at) = frames.iter().position(|of| of.choice == trial) else {
-                return Err(trial);
-            };
-            let (ratio, has_after) = ratio(frames, at, sample..sample + 1);
-            sum += ratio;
-            cost += (ratio - 1.0).max(0.0) * Counted::SAMPLE_SHARE;
-            let largest = if has_after { LARGEST_RISK } else { 1.0 };
-            if sum / (sample + 1) as f64 > largest {
-                if has_after {
-                    continue 'orders;
+        let tried = frame.choice.sampled.unwrap_or(frame.choice.order);
+        let is_trial = tried != current;
+        if let Some(of_round) = &mut round {
+            if is_trial {
+                of_round.trials.push(at);
+            }
+            if let Some(decided) = decide(&frames[..=at], current, of_round, is_trial) {
+                let wait = LEAST_WAIT.max((decided.cost / BUDGET).ceil() as usize);
+                for (order, first) in &mut due {
+                    let least = if decided.replaces {
+                        LEAST_WAIT
+                    } else if *order == of_round.other {
+                        wait
+                    } else {
+                        0
+                    };
+                    *first = (*first).max(at + 1 + least);
                 }
-                return Err(Choice::whole(current));
+                current = if decided.replaces {
+                    of_round.other
+                } else {
+                    current
+                };
+                round = None;
             }
         }
-        let Some(at) = frames.iter().position(|of| of.choice.order == order) else {
-            return Err(Choice::whole(order));
-        };
-        let (ratio, has_after) = ratio(frames, at, 0..Counted::SAMPLES + 1);
-        if (ratio - 1.0).abs() < CLEAR && !has_after {
-            return Err(Choice::whole(current));
-        }
-        cost += (ratio - 1.0).max(0.0);
-        if ratio < least {
-            (best, least) = (order, ratio);
+        let is_cold = at == 0 && frame.fetched() < COLD_FRAME_L2S * setting.l2_lines;
+        if round.is_none() && frame.choice == Choice::whole(current) && !is_cold {
+            let others = due
+                .iter()
+                .filter(|(order, first)| *order != current && *first <= at + 1);
+            round = others
+                .min_by_key(|(_, first)| *first)
+                .map(|(other, _)| Round {
+                    other: *other,
+                    trials: Vec::new(),
+                });
         }
     }
-    Ok(Settled { order: best, cost })
+    // The L2 keeps most lines of a small frame until the next frame, and neighbours on the curve matter more than the
+    // other eye.
+    if frames.last().is_some_and(is_small) {
+        return Choice::whole(Order::MORTON);
+    }
+    match round {
+        Some(of) if of.trials.is_empty() && !setting.reprojects => Choice {
+            order: current,
+            sampled: Some(of.other),
+        },
+        Some(of) if frames.last().map(|last| last.choice.order) == Some(current) => {
+            Choice::whole(of.other)
+        }
+        _ => Choice::whole(current),
+    }
 }
 
-/// The lines of some parts of the frame `at` relative to those of the last frames before without a trial in them, or to the
-/// mean with the first ones after, if there are any (then true). Frames differ by themselves, most of all in few pairs.
-fn ratio(frames: &[Counted], at: usize, parts: Range<usize>) -> (f64, bool) {
-    let current = frames[0].choice.order;
-    let is_plain = |of: &Counted, part: usize| {
-        let sample = of.choice.sampled.map(|(sample, _)| sample);
-        of.choice.order == current && sample != Some(part)
-    };
-    let sum = |frame_of: &dyn Fn(usize) -> Option<usize>| {
-        let mut sum = Count::default();
-        for part in parts.clone() {
-            sum.add(&frames[frame_of(part)?].parts[part]);
+/// Whether the round's order replaces the current one; none if that is open.
+fn decide(known: &[Counted], current: Order, round: &Round, is_trial: bool) -> Option<Decided> {
+    let (mut sum, mut trials, mut cost) = (0.0, 0, 0.0_f64);
+    let mut is_risky = false;
+    for at in &round.trials {
+        let more = difference(known, *at, current);
+        if known[*at].choice.sampled.is_some() {
+            is_risky = more > LARGEST_RISK;
+            cost += more.max(0.0) * Counted::SAMPLE_SHARE;
+        } else {
+            sum += more;
+            trials += 1;
         }
-        Some(sum)
-    };
-    let own = sum(&|_| Some(at)).unwrap_or_default();
-    let earlier = |part| {
-        frames[..at]
-            .iter()
-            .rposition(|of| is_plain(of, part))
-            .or(Some(0))
-    };
-    let later = |part| (at..frames.len()).find(|number| is_plain(&frames[*number], part));
-    let before = own.over(&sum(&earlier).unwrap_or_default());
-    match sum(&later) {
-        Some(after) => (2.0 / (1.0 / before + 1.0 / own.over(&after)), true),
-        None => (before, false),
     }
+    let [worse, better] = if is_trial {
+        [CLEARLY_WORSE, CLEARLY_BETTER]
+    } else {
+        [WORSE, BETTER]
+    };
+    let replaces = if trials == 0 {
+        is_risky.then_some(false)
+    } else if sum > worse || sum < better {
+        Some(sum < better)
+    } else {
+        (!is_trial && trials == MOST_TRIALS).then_some(sum < 0.0)
+    };
+    replaces.map(|replaces| Decided {
+        replaces,
+        cost: cost + sum.max(0.0),
+    })
+}
+
+/// The logarithm of the lines that a trial fetches per line read, relative to the mean of the nearest frames before and
+/// after it in the current order. A trial in a sample is compared with the same pairs.
+fn difference(known: &[Counted], at: usize, current: Order) -> f64 {
+    let is_sampled = known[at].choice.sampled.is_some();
+    let of = |frame: &Counted| {
+        let mut sum = Count::default();
+        let parts = if is_sampled { 1 } else { frame.parts.len() };
+        frame.parts[..parts].iter().for_each(|part| sum.add(part));
+        sum
+    };
+    let is_plain = |frame: &&Counted| frame.choice == Choice::whole(current);
+    let before = known[..at].iter().rfind(is_plain);
+    let after = known[at + 1..].iter().find(is_plain);
+    let differences = before.into_iter().chain(after);
+    let (sum, count) = differences.fold((0.0, 0), |(sum, count), plain| {
+        (sum + of(&known[at]).over(&of(plain)).ln(), count + 1)
+    });
+    sum / f64::from(count.max(1))
 }
 
 #[cfg(test)]
@@ -143,75 +178,141 @@ mod tests {
     use super::*;
 
     const FRAMES: usize = 400;
+    const ORDERS: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
 
-    /// Frames in which only the order decides how many of 1000 lines are fetched (of each of [`CHOICES`]). Returns the
-    /// order of each frame, and the lines that are fetched of 1000 in the mean.
-    fn play(l2_lines: u64, fetched: [u64; 3]) -> (Vec<Choice>, f64) {
-        let of = |order: Order| fetched[CHOICES.iter().position(|of| *of == order).unwrap()];
-        let setting = Setting {
-            l2_lines,
-            reprojects: false,
-        };
+    /// Frames in which an order fetches so many of 1000 lines, times what the frame itself adds. Returns the orders, and
+    /// the lines that are fetched of 1000 in the mean.
+    fn play(
+        setting: Setting,
+        fetched: [u64; 3],
+        noise: impl Fn(usize) -> f64,
+    ) -> (Vec<Choice>, f64) {
+        let of = |order: Order| fetched[ORDERS.iter().position(|of| *of == order).unwrap()];
         let mut known: Vec<Counted> = Vec::new();
-        for _ in 0..FRAMES {
+        for at in 0..FRAMES {
             let choice = choose(&known, &setting);
             assert_eq!(choice, choose(&known, &setting));
-            let part = |part, quarters| {
-                let tried = choice.sampled.filter(|(sample, _)| *sample == part);
-                Count {
-                    read: 1000 * quarters,
-                    fetched: quarters * of(tried.map_or(choice.order, |(_, order)| order)),
-                }
+            let part = |order: Order, quarters: u64| Count {
+                read: 1_000_000 * quarters,
+                fetched: (1000.0 * (quarters * of(order)) as f64 * noise(at)) as u64,
             };
+            let sampled = choice.sampled.unwrap_or(choice.order);
             known.push(Counted {
                 choice,
-                parts: [part(0, 1), part(1, 1), part(2, 2)],
+                parts: [part(sampled, 1), part(choice.order, 3)],
             });
         }
         let lines: u64 = known.iter().map(Counted::fetched).sum();
         let choices = known.iter().map(|of| of.choice).collect();
-        (choices, lines as f64 / (4 * FRAMES) as f64)
+        (choices, lines as f64 / (4000 * FRAMES) as f64)
+    }
+
+    const FULL: Setting = Setting {
+        l2_lines: 16,
+        reprojects: false,
+    };
+    const REPROJECTED: Setting = Setting {
+        reprojects: true,
+        ..FULL
+    };
+
+    /// Repeats every seven frames, with a mean of 1 and a standard deviation of 2 %.
+    fn uneven(at: usize) -> f64 {
+        1.0 + [0.03, -0.02, 0.01, -0.03, 0.02, 0.0, -0.01][at % 7]
     }
 
     #[test]
     fn all_frames_together_fetch_hardly_more_than_the_best_order() {
         let levels = [500, 503, 530, 600, 1000];
-        for (morton, lrta) in levels.into_iter().flat_map(|a| levels.map(|b| (a, b))) {
-            for (sta, l2_lines) in levels
-                .into_iter()
-                .flat_map(|sta| [(sta, 16), (sta, 1 << 20)])
-            {
-                let (_, lines) = play(l2_lines, [morton, lrta, sta]);
-                // Small frames may use Morton order.
-                let least = if l2_lines > 16 {
-                    morton.min(lrta)
-                } else {
-                    lrta
+        for setting in [FULL, REPROJECTED] {
+            for (morton, lrta) in levels.into_iter().flat_map(|a| levels.map(|b| (a, b))) {
+                for sta in levels {
+                    let (_, lines) = play(setting, [morton, lrta, sta], |_| 1.0);
+                    // With both eyes in full, Morton is tried in small frames only.
+                    let least = if setting.reprojects { morton } else { lrta };
+                    let least = least.min(lrta).min(sta);
+                    // The first frame and the first trials of both other orders have no limit. A better order may take -6 % to be seen.
+                    let dearest = morton.max(lrta).max(sta);
+                    let waits = (FIRST_MORTON + 2 * LEAST_WAIT) as u64;
+                    let late = if setting.reprojects {
+                        waits * (lrta.min(sta) - least)
+                    } else {
+                        0
+                    };
+                    let start = (3 * (dearest - least) + late) as f64 + 0.06 * least as f64;
+                    let most = least as f64 * (1.0 + 2.0 * BUDGET) + start / FRAMES as f64 + 0.5;
+                    assert!(
+                        lines <= most,
+                        "{setting:?} {morton} {lrta} {sta}: {lines} {most}"
+                    );
                 }
-                .min(sta);
-                // The start and the first trials have no limit.
-                let start = 4.0 * (1000.0 - least as f64) / FRAMES as f64;
-                let most = least as f64 * (1.0 + BUDGET) + start;
-                assert!(lines <= most, "{morton} {lrta} {sta} {l2_lines}: {lines}");
             }
         }
     }
 
-    /// However bad the other order is, and although trials never end.
     #[test]
-    fn trials_of_bad_orders_keep_their_budget() {
-        for worse in [501, 505, 524, 526, 600, 1000] {
-            let (choices, lines) = play(16, [1000, worse, 500]);
-            assert!(choices.iter().all(|of| of.order == START || worse < 526));
-            let trials = choices.iter().filter(|of| of.sampled.is_some()).count();
-            assert!(
-                trials > FRAMES / 200 && choices[FRAMES - 1].order == START,
-                "{worse}"
-            );
-            // The last round may have waited for less than its share.
-            let last_round = 500.0 * 0.05 + (worse as f64 - 500.0) / 2.0;
-            let most = 500.0 * (1.0 + BUDGET) + last_round / FRAMES as f64;
-            assert!(lines <= most, "{worse}: {lines}");
+    fn the_better_order_is_found_although_frames_differ() {
+        for setting in [FULL, REPROJECTED] {
+            for (lrta, sta) in [(400, 440), (440, 400), (400, 415), (415, 400)] {
+                let better = if lrta < sta {
+                    Order::Z2_LRTA
+                } else {
+                    Order::Z2_STA
+                };
+                let (choices, _) = play(setting, [480, lrta, sta], uneven);
+                let found = choices.iter().filter(|of| of.order == better).count();
+                assert!(found > FRAMES * 4 / 5, "{setting:?} {lrta} {sta}: {found}");
+            }
         }
+    }
+
+    #[test]
+    fn an_order_with_bad_samples_never_has_a_whole_frame() {
+        for worse in [530, 600, 1000] {
+            let (choices, _) = play(FULL, [1000, worse, 500], |_| 1.0);
+            assert!(choices.iter().all(|of| of.order == START));
+            let trials = choices.iter().filter(|of| of.sampled.is_some()).count();
+            assert!((2..FRAMES / 20).contains(&trials), "{worse}: {trials}");
+        }
+    }
+
+    #[test]
+    fn frames_that_fit_into_the_l2_have_morton_order() {
+        for setting in [FULL, REPROJECTED] {
+            let large = Setting {
+                l2_lines: 4_000_000,
+                ..setting
+            };
+            let (choices, _) = play(large, [900, 500, 500], uneven);
+            assert!(
+                choices[1..]
+                    .iter()
+                    .all(|of| *of == Choice::whole(Order::MORTON))
+            );
+        }
+    }
+
+    #[test]
+    fn a_first_frame_that_may_owe_its_lines_to_empty_caches_is_not_compared() {
+        let first = Counted {
+            choice: Choice::whole(START_REPROJECTED),
+            parts: [Count {
+                read: 100,
+                fetched: 20,
+            }; 2],
+        };
+        let next = |frames: &[Counted], l2_lines| {
+            choose(
+                frames,
+                &Setting {
+                    l2_lines,
+                    ..REPROJECTED
+                },
+            )
+            .order
+        };
+        assert_eq!(next(&[first], 20), Order::Z2_STA);
+        assert_eq!(next(&[first], 21), Order::Z2_LRTA);
+        assert_eq!(next(&[first; 2], 21), Order::Z2_STA);
     }
 }
