@@ -39,7 +39,7 @@ pub struct Args {
         conflicts_with = "command"
     )]
     traces: Vec<PathBuf>,
-    /// Command that captures the path; --plan-only, --frames and -o are added to it
+    /// Command that captures the path; --plan-only, --frames, --no-plain and -o are added to it
     #[arg(last = true, value_name = "COMMAND")]
     command: Vec<OsString>,
     /// Folder for the traces of COMMAND [default: a temporary one]
@@ -302,7 +302,11 @@ fn driven(
             plan.len()
         ));
         let file = folder.join(format!("stage-{stage}.textrace"));
-        capture(&["--frames", &frames], &file)?;
+        // The render without capture costs as much as the capture, and only its time would be printed.
+        let is_needed = |flag: &&str| !rest.iter().any(|word| word == flag);
+        let skip = ["--no-plain"].into_iter().filter(is_needed);
+        let added: Vec<&str> = ["--frames", &frames].into_iter().chain(skip).collect();
+        capture(&added, &file)?;
         add(points, &file, true)?;
         report = stepped(args, points, &plan, promise);
     }

@@ -12,7 +12,7 @@
 //! least the square root of this area in any norm. It is smallest where w is smallest, at the nearest point
 //! of the triangle. This gives a lower bound for the level of detail before anything is drawn.
 
-use glam::{Affine3A, DMat3, DVec2, DVec3, Mat4, Vec2, Vec3};
+use glam::{Affine3A, DVec2, DVec3, Mat4, Vec2, Vec3};
 
 /// Maximum distance in pixels from a covered lane to the other lanes of its quad, with a margin for the
 /// rasteriser's grid.
@@ -77,20 +77,16 @@ pub fn least_derivative_squared(
 }
 
 /// Smallest `w_a w_b w_c / |det V|` of a triangle's quads.
-fn spread(vertices: [DVec3; 3], least_w: f64) -> f64 {
-    let v = DMat3::from_cols_array_2d(&vertices.map(|v| v.to_array()));
-    let det = v.determinant().abs();
+fn spread([a, b, c]: [DVec3; 3], least_w: f64) -> f64 {
+    let normals = [b.cross(c), c.cross(a), a.cross(b)];
+    let det = a.dot(normals[0]).abs();
     if det == 0.0 {
         // A triangle that is seen edge-on covers no pixels.
         return f64::INFINITY;
     }
     // 1/w is linear in the picture. Compute its slopes, and its largest value where the triangle is visible.
-    let slopes = v.inverse().transpose() * DVec3::ONE;
-    let nearest = vertices
-        .iter()
-        .map(|v| v.z)
-        .fold(f64::INFINITY, f64::min)
-        .max(least_w);
+    let slopes = (normals[0] + normals[1] + normals[2]) / det;
+    let nearest = a.z.min(b.z).min(c.z).max(least_w);
     let largest = 1.0 / nearest + LANE_PX * (slopes.x.abs() + slopes.y.abs());
     1.0 / (det * largest.powi(3))
 }

@@ -43,6 +43,8 @@ pub struct Cold {
 struct Filling {
     lines: Vec<u32>,
     ways: u32,
+    /// Lines that the sets that are not full lack.
+    lacks: u64,
 }
 
 impl Filling {
@@ -50,6 +52,7 @@ impl Filling {
         Self {
             lines: vec![0; sets as usize],
             ways,
+            lacks: u64::from(sets) * u64::from(ways),
         }
     }
 
@@ -58,6 +61,7 @@ impl Filling {
         let set = line as usize & (self.lines.len() - 1);
         let cold = self.lines[set] < self.ways;
         self.lines[set] += u32::from(cold);
+        self.lacks -= u64::from(cold);
         cold
     }
 }
@@ -130,6 +134,16 @@ fn of_run(run: &Run<'_>, config: &RunConfig) -> Result<Vec<(u32, Cold)>, ReplayE
     let mut out = Vec::new();
     for number in frames {
         counting.cold = Cold::default();
+        if counting
+            .l1
+            .iter()
+            .chain([&counting.l2])
+            .all(|of| of.lacks == 0)
+        {
+            // All sets are exact from here on.
+            out.push((number, Cold::default()));
+            continue;
+        }
         let frame = walk.expand(number)?;
         let phases = walk.plan(&frame)?.phases(config);
         let mut cores = Cores::new(&frame, config.cores as usize);
