@@ -54,7 +54,7 @@ fn choose(frames: &[Counted], setting: &Setting) -> Choice {
         START
     };
     let is_small = |of: &Counted| of.fetched() <= setting.l2_lines;
-    // The first frame in which an order may be tried. With both eyes in full, `morton` is never much better.
+    // The first frame in which an order may be tried. With both eyes in full, `morton` is hardly better in large frames.
     let mut due = vec![(Order::Z2_LRTA, 1), (Order::Z2_STA, 1)];
     if setting.reprojects {
         due.push((Order::MORTON, FIRST_MORTON));
