@@ -108,12 +108,7 @@ impl<'a> PreparedRay<'a> {
         let negative = direction.is_negative_bitmask() as usize;
         let axes = SHEARED_AXES[longest][negative >> longest & 1];
         let d: &[f32; 3] = ray.direction.as_ref();
-        let reach = (origin - Vec3A::from(bounds.0))
-            .abs()
-            .max((origin - Vec3A::from(bounds.1)).abs());
-        let reach_z = reach.to_array()[longest];
-        // Twice the paper's bound, plus the rounding of the shifted origin and its product.
-        let pad = 2.0 * SLAB_EPSILON * (reach + reach_z) + 2.0 * f32::EPSILON * origin.abs() + more;
+        let pad = slab_pad(origin, longest, bounds) + more;
         let least = Vec3A::splat(LEAST_DIRECTION);
         let direction = Vec3A::select(size.cmplt(least), least.copysign(direction), direction);
         let reciprocal = 1.0 / direction;
@@ -133,11 +128,10 @@ impl<'a> PreparedRay<'a> {
         }
     }
 
-    /// How far a sheared coordinate moves if a vertex moves by the slabs' padding.
+    /// The slabs' padding for a part of the scene with these bounds.
     #[inline(always)]
-    pub fn sheared_pad(&self) -> f32 {
-        let [x, y, z] = self.axes.map(|axis| self.pad[axis]);
-        x.max(y) + z
+    pub fn pad_within(&self, bounds: (Vec3, Vec3)) -> Vec3A {
+        slab_pad(self.ray.origin.into(), self.axes[2], bounds)
     }
 
     /// Distance to a box's near plane on this axis, rounded towards an earlier entry.
@@ -246,6 +240,18 @@ impl<'a> PreparedRay<'a> {
         let t = normal.dot(v0 - self.ray.origin.as_dvec3()) / slope;
         t.is_finite().then(|| (t as f32).clamp(near, far))
     }
+}
+
+/// By axis, the padding of slabs for triangles within bounds, for a direction that is longest along
+/// an axis.
+#[inline(always)]
+fn slab_pad(origin: Vec3A, longest: usize, bounds: (Vec3, Vec3)) -> Vec3A {
+    let reach = (origin - Vec3A::from(bounds.0))
+        .abs()
+        .max((origin - Vec3A::from(bounds.1)).abs());
+    let reach_z = reach.to_array()[longest];
+    // Twice the paper's bound, plus the rounding of the shifted origin and its product.
+    2.0 * SLAB_EPSILON * (reach + reach_z) + 2.0 * f32::EPSILON * origin.abs()
 }
 
 /// An edge function of the sheared space.

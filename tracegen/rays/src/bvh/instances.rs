@@ -125,19 +125,36 @@ pub(super) struct Instance {
     pub tree: u32,
     first_primitive: u32,
     mirrored: bool,
+    /// Largest size in the mesh's space of a vector whose coordinates in the world are at most 1.
+    inverse_size: f32,
+    /// Box in the world.
+    bounds: (Vec3, Vec3),
     /// World position that its coordinates in the world are relative to.
-    origin: [f64; 4],
+    origin: [f64; 3],
     to_world: Columns,
 }
 
 impl Instance {
-    fn new(placement: Placement, origin: DVec3, tree: usize, first_primitive: u32) -> Self {
+    fn new(
+        placement: Placement,
+        bounds: &Triangle,
+        origin: DVec3,
+        tree: usize,
+        first_primitive: u32,
+    ) -> Self {
         let inverse = placement.transform.matrix3.inverse();
+        let rows = inverse.transpose();
+        let size = |row: DVec3| row.abs().element_sum();
+        let inverse_size = size(rows.x_axis)
+            .max(size(rows.y_axis))
+            .max(size(rows.z_axis));
         let from = placement.transform.translation - origin;
         Self {
             mirrored: placement.mirrored,
             to_world: Columns::new(&placement.transform),
-            origin: [origin.x, origin.y, origin.z, 0.0],
+            inverse_size: inverse_size as f32,
+            bounds: (bounds[0].into(), bounds[1].into()),
+            origin: origin.to_array(),
             to_object: Columns::new(&DAffine3::from_mat3_translation(inverse, inverse * -from)),
             tree: tree as u32,
             first_primitive,
@@ -149,6 +166,22 @@ impl Instance {
     fn pad(&self, world: Vec3A) -> Vec3A {
         let sizes = Columns(self.to_object.0.map(|column| column.map(f64::abs)));
         rounded(sizes.times::<false>((PADS * world).to_array())).into()
+    }
+
+    /// How far sheared coordinates in the mesh's space may be off. Lines need less padding than
+    /// slabs: the world's line test is off by the distance to the instance, whereas slabs of the
+    /// world are padded for the whole scene.
+    #[inline(always)]
+    fn sheared_pad(
+        &self,
+        world: &PreparedRay<'_>,
+        moved: &PreparedRay<'_>,
+        bounds: (Vec3, Vec3),
+    ) -> f32 {
+        let own = moved.pad_within(bounds).max_element();
+        let more = PADS * self.inverse_size * world.pad_within(self.bounds).max_element();
+        // A vertex moves along two axes.
+        2.0 * (own + more)
     }
 
     /// Triangles of the mesh in the world, as [`Placement::triangle`] has them.
@@ -261,7 +294,10 @@ impl Bvh {
                         *tree_of[placement.mesh].insert(trees.len() - 1)
                     }
                 };
-                placed.push((bounds, Instance::new(*placement, origin, tree, first)));
+                placed.push((
+                    bounds,
+                    Instance::new(*placement, &bounds, origin, tree, first),
+                ));
             } else {
                 rest.extend(mesh.iter().map(|t| placement.triangle(origin, *t)));
                 rest_numbers.extend(numbers.clone().map(|n| number(n, n)));
@@ -278,7 +314,10 @@ impl Bvh {
                 mirrored: false,
             };
             let bounds = boxed([min, max].map(|p| p.to_array()).into_iter());
-            placed.push((bounds, Instance::new(here, DVec3::ZERO, trees.len(), 0)));
+            placed.push((
+                bounds,
+                Instance::new(here, &bounds, DVec3::ZERO, trees.len(), 0),
+            ));
             trees.push(tree);
         }
         Self::over(options, placed, trees)
@@ -506,7 +545,7 @@ impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a, K>> LeafTest<K> for En
             world: self.world,
             instance,
             first_block: tree.first_block,
-            sheared_pad: prepared.sheared_pad(),
+            sheared_pad: instance.sheared_pad(self.prepared, &prepared, tree.bvh.bounds),
         };
         self.search
             .enter(&tree.bvh, W::first_slots(&tree.bvh), place);
