@@ -13,6 +13,8 @@ OPTIONS = {
 # Scene, path, frames, pixels per eye, caches (KiB).
 PATHS = [
     ("atrium", "head", 600, "240x270", "16/256"), ("lab", "head", 900, "240x270", "8/64"), ("dabrovic-sponza", "head", 1200, "480x540", "8/64"),
+    ("atrium-plain", "head", 1200, "480x540", "8/64"),
+    *((scene, "head", 900, "240x270", "8/64") for scene in ("music-box", "chess_42k", "crytek-sponza")),
     *((scene, "walk", 900, "240x270", "8/64") for scene in ("lab", "music-box", "chess_42k", "dabrovic-sponza", "atrium-plain")),
 ]
 

@@ -46,6 +46,45 @@ fn plain_bytes(trace: &Path, order: Option<&str>) -> u64 {
     misses * LINE_BYTES
 }
 
+/// Any order of a batch's rays reads the same lines, so caches that keep all lines fetch the same bytes.
+#[test]
+fn sorted_rays_fetch_other_lines_only_from_caches_that_lose_some() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = folder.path().join("chess.raytrace");
+    let words = "rays chess --all-columns --bounces 2 --size 48x40 -o";
+    run_ok(program("tracegen").args(words.split(' ')).arg(&trace));
+    let sorts = ["none", "generation", "direction", "origin"];
+    let bytes = |l2_bytes: u32, eyes: &str| {
+        let config = folder.path().join("caches.toml");
+        let caches = "[cache]\nnode_l1_bytes = 4096\ntriangle_l1_bytes = 4096\nl2_bytes";
+        std::fs::write(&config, format!("{caches} = {l2_bytes}\n")).expect("written");
+        let config = config.to_str().expect("text");
+        sorts.map(|sort| {
+            let words = ["--config", config, "--order", eyes, "--sort-rays", sort];
+            dram(&reprojected(&words, &[&trace])[0])
+        })
+    };
+    for eyes in ["z2-lrta", "z2-sta"] {
+        let [none, others @ ..] = bytes(1 << 24, eyes);
+        assert_eq!(others, [none; 3], "{eyes}");
+        let mut small = bytes(1 << 14, eyes);
+        small.sort_unstable();
+        assert!(small.windows(2).all(|two| two[0] < two[1]), "{small:?}");
+    }
+    let plain = folder.path().join("plain.raytrace");
+    let words = "rays chess --visits --size 48x40 -o";
+    run_ok(program("tracegen").args(words.split(' ')).arg(&plain));
+    let words = ["reproject", "--sort-rays", "origin"];
+    refuse(
+        program("replay").args(words).arg(&plain),
+        &[
+            "tni.ray_sort (origin)",
+            "--all-columns",
+            "found a trace without",
+        ],
+    );
+}
+
 fn reprojected(arguments: &[&str], traces: &[&Path]) -> Vec<Value> {
     let mut command = program("replay");
     command

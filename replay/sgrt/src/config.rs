@@ -1,6 +1,7 @@
 //! The parameters of the model, read from TOML. `data/sgrt-default.toml` documents the defaults.
 
 use super::prefetch::RayPrefetching;
+use super::ray_sort::{self, RaySort};
 use formats::raytrace::TraversalKind;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,13 @@ pub struct Tni {
     pub rays_in_flight: u32,
     /// Rays that a unit accepts or returns per cycle.
     pub rays_per_cycle: f64,
+    /// The order in which units take the rays of a batch.
+    #[serde(default = "ray_sort::none", skip_serializing_if = "is_unsorted")]
+    pub ray_sort: RaySort,
+}
+
+fn is_unsorted(sort: &RaySort) -> bool {
+    *sort == ray_sort::none()
 }
 
 /// Caches of the hierarchy.

@@ -98,11 +98,11 @@ pub enum FrameError {
         "{0}: expected a trace with the visits of its rays (tracegen rays --visits), found a trace without"
     )]
     NoVisits(&'static str),
-    /// The stacks of rays are needed.
+    /// A key and its value need the geometry of rays.
     #[error(
-        "cycles.prefetch ({0}): expected a trace with its hierarchy and the geometry of its rays (tracegen rays --all-columns), found a trace without"
+        "{0} ({1}): expected a trace with its hierarchy and the geometry of its rays (tracegen rays --all-columns), found a trace without"
     )]
-    NoColumns(&'static str),
+    NoColumns(&'static str, &'static str),
     /// An unreadable hierarchy.
     #[error("{0}")]
     Hierarchy(TileError),

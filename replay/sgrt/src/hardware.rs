@@ -6,6 +6,7 @@ use super::config::SgrtConfig;
 use super::detect::Decision;
 use super::energy_bounds::relative_bounds;
 use super::frame::{Frame, FrameError, RaySource};
+use super::ray_sort::{self, RaySort};
 use super::run::Run;
 use super::tile_orders::usual_plan;
 use super::ways::Way;
@@ -206,6 +207,18 @@ pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), F
     Ok(())
 }
 
+/// Whether a sort needs the geometry of rays.
+///
+/// # Errors
+/// [`FrameError`] for a trace without, and for an unreadable hierarchy.
+pub(super) fn check_sort(source: &dyn RaySource, sort: RaySort) -> Result<bool, FrameError> {
+    let needed = sort.row().needs_geometry;
+    if needed && source.hierarchy().map_err(FrameError::Hierarchy)?.is_none() {
+        return Err(FrameError::NoColumns("tni.ray_sort", sort.name()));
+    }
+    Ok(needed)
+}
+
 /// Whether rays of a class are traced for a sample of an eye.
 pub(super) type Kept<'a> = dyn Fn(Eye, usize, RayClass) -> bool + Sync + 'a;
 
@@ -256,8 +269,10 @@ pub(super) fn misses_of(
     choices: &[(&Kept<'_>, &SgrtConfig)],
     caches: &mut [&mut DeviceCaches],
 ) -> Result<Vec<[Vec<Misses>; 2]>, FrameError> {
+    let mut needs_geometry = false;
     for (_, config) in choices {
         check_lines(&frame.tables.bvh, config)?;
+        needs_geometry |= check_sort(source, config.tni.ray_sort)?;
     }
     let none = vec![Misses::default(); frame.tables.tile_count() as usize];
     let mut found = vec![[none.clone(), none]; choices.len()];
@@ -265,13 +280,13 @@ pub(super) fn misses_of(
     for batches in batches.chunks(DECODED_BATCHES) {
         let tiles: Vec<Result<Vec<RayTile>, FrameError>> = (batches
             .par_iter()
-            .map(|batch| decoded(source, batch, false)))
+            .map(|batch| decoded(source, batch, needs_geometry)))
         .collect();
         let tiles = tiles.into_iter().collect::<Result<Vec<_>, _>>()?;
         let runs = caches.par_iter_mut().zip(&mut found).zip(choices);
-        runs.for_each(|((caches, found), (kept, _))| {
+        runs.for_each(|((caches, found), (kept, config))| {
             for (batch, tiles) in batches.iter().zip(&tiles) {
-                for_rays(frame, plan, batch, tiles, |of| {
+                for_rays(frame, plan, config.tni.ray_sort, batch, tiles, |of| {
                     if kept(eye_of(of.at), of.sample, RayClass::of(of.ray)) {
                         caches.tile = of.at.tile;
                         let misses = &mut found[of.at.pass as usize][of.at.tile as usize];
@@ -317,13 +332,30 @@ pub(super) struct RayTurn<'a> {
     pub geometry: Option<&'a RayGeometry>,
 }
 
-/// Calls `visit` for each ray of a batch in the order of `plan`.
+/// Calls `visit` for each ray of a batch in the order of `plan` and `sort`.
 pub(super) fn for_rays(
     frame: &Frame,
     plan: &RayPlan,
+    sort: RaySort,
     batch: &[WorkItem],
     tiles: &[RayTile],
-    mut visit: impl FnMut(RayTurn<'_>),
+    visit: impl FnMut(RayTurn<'_>),
+) {
+    if sort == ray_sort::none() {
+        return for_rays_of_pixels(frame, plan, batch, tiles, visit);
+    }
+    let mut turns = Vec::new();
+    for_rays_of_pixels(frame, plan, batch, tiles, |turn| turns.push(turn));
+    ray_sort::sort(sort, &mut turns);
+    turns.into_iter().for_each(visit);
+}
+
+fn for_rays_of_pixels<'a>(
+    frame: &Frame,
+    plan: &RayPlan,
+    batch: &[WorkItem],
+    tiles: &'a [RayTile],
+    mut visit: impl FnMut(RayTurn<'a>),
 ) {
     let places: Vec<TileRef> = tiles_of(batch).collect();
     let pixels: Vec<usize> = tiles.iter().map(|tile| tile.pixels.len()).collect();

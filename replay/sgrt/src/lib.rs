@@ -32,6 +32,7 @@ pub mod prefetch;
 pub mod presets;
 mod ray_batches;
 pub mod ray_kinds;
+pub mod ray_sort;
 pub mod readings;
 pub mod reads;
 pub mod reproject;

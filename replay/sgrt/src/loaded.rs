@@ -9,6 +9,7 @@ use super::hardware::{
     Comparison, Kept, RemainingWork, TileMisses, TileWork, misses_by_addresses, misses_by_rates,
     misses_in_usual_order,
 };
+use super::ray_sort;
 use super::reads::Reads;
 use super::reproject::{Reprojection, reproject};
 use super::result::{ImageError, Outcome};
@@ -276,6 +277,12 @@ impl<'a> LoadedTrace<'a> {
             return misses_by_addresses(&self.frame, runs, |choices| {
                 misses_in_usual_order(self.source, &self.frame, choices)
             });
+        }
+        if runs
+            .iter()
+            .any(|(_, config)| config.tni.ray_sort != ray_sort::none())
+        {
+            return Err(FrameError::NoVisits("tni.ray_sort"));
         }
         let of_run = |(work, config): &(&RemainingWork, &_)| {
             misses_by_rates(&work.tiles, &self.frame, config)

@@ -86,7 +86,8 @@ impl<'a> RayBatches<'a> {
         let frame = self.model.frame;
         let bvh = &frame.tables.bvh;
         let line_bytes = self.model.config.cache.line_bytes;
-        for_rays(frame, self.plan, items, tiles, |of| {
+        let sort = self.model.config.tni.ray_sort;
+        for_rays(frame, self.plan, sort, items, tiles, |of| {
             let eye = eye_of(of.at);
             let is_complete = eye == Eye::Left || self.way == Way::Reference;
             let decision = self.decisions.get(of.sample).filter(|_| !is_complete);
@@ -178,7 +179,9 @@ impl BatchSource for RayBatches<'_> {
                 break of_eyes;
             }
         };
-        let tiles = decoded(self.source, &items, self.prefetcher.is_some())?;
+        let sort = self.model.config.tni.ray_sort;
+        let needs_geometry = self.prefetcher.is_some() || sort.row().needs_geometry;
+        let tiles = decoded(self.source, &items, needs_geometry)?;
         self.add_rays(&items, &tiles, batch);
         self.make_items(batch);
         let of_cores = &self.model.batch(self.way, &items, self.work);

@@ -10,7 +10,9 @@ use super::cycles::{
 use super::detect::Decision;
 use super::energy;
 use super::frame::{FrameError, RaySource};
-use super::hardware::{Comparison, Kept, TileMisses, TileWork, check_lines, misses_in_usual_order};
+use super::hardware::{
+    Comparison, Kept, TileMisses, TileWork, check_lines, check_sort, misses_in_usual_order,
+};
 use super::prefetch::Prefetcher;
 use super::ray_batches::RayBatches;
 use super::timing::{CycleTiming, FrameTiming, IdlePct, PrefetchTiming};
@@ -48,6 +50,7 @@ impl TracedTiming {
             return Err(FrameError::NoVisits("--timing cycle"));
         }
         check_lines(&tables.bvh, model.config)?;
+        check_sort(source, model.config.tni.ray_sort)?;
         let machine = Machine::new(model.config, tables.bvh.traversal);
         let prefetcher = Prefetcher::new(&model.config.cycles.prefetch, source)?;
         let units = (&machine, prefetcher.as_ref());

@@ -18,6 +18,7 @@ use sgrt::loaded::{LoadedTrace, RuleRun};
 use sgrt::picture;
 use sgrt::prefetch::RayPrefetching;
 use sgrt::ray_kinds::OfKinds;
+use sgrt::ray_sort::RaySort;
 use sgrt::result::{Config, Report, SCHEMA};
 use sgrt::tile_orders::{self, RayOrder, TileSequence};
 use sgrt::timing::Timing;
@@ -59,6 +60,9 @@ pub struct ReprojectArgs {
     /// What the units fetch ahead into their caches, with --timing cycle [default: none, or the configuration's]
     #[arg(long, value_parser = choice::<RayPrefetching>())]
     prefetch: Option<RayPrefetching>,
+    /// The order in which units take the rays of a tile or of a pair of tiles [default: none, or the configuration's]
+    #[arg(long, value_name = "SORT", value_parser = choice::<RaySort>())]
+    sort_rays: Option<RaySort>,
     #[arg(long, help = tile_orders::help(), value_parser = str::parse::<RayOrder>)]
     order: Option<RayOrder>,
     /// Files are consecutive frames of a path, between which the caches keep, lose-N or flush their lines: lose-N
@@ -98,8 +102,13 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.threads.start()?;
     let config = args.parameters()?;
     if args.print_config {
-        let text = match (args.reused.preset, &args.reused.config, args.prefetch) {
-            (None, None, None) => DEFAULT_TOML.to_owned(),
+        let text = match (
+            args.reused.preset,
+            &args.reused.config,
+            args.prefetch,
+            args.sort_rays,
+        ) {
+            (None, None, None, None) => DEFAULT_TOML.to_owned(),
             _ => toml::to_string(&config)?,
         };
         super::print(&text)?;
@@ -139,6 +148,7 @@ impl ReprojectArgs {
             config.cycles.prefetch.prefetcher = prefetcher;
             config.check().context("--prefetch")?;
         }
+        config.tni.ray_sort = self.sort_rays.unwrap_or(config.tni.ray_sort);
         Ok(config)
     }
 

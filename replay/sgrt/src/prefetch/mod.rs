@@ -87,7 +87,10 @@ impl Prefetcher {
             return Ok(None);
         }
         let hierarchy = source.hierarchy().map_err(FrameError::Hierarchy)?;
-        let hierarchy = hierarchy.ok_or(FrameError::NoColumns(config.prefetcher.name()))?;
+        let hierarchy = hierarchy.ok_or(FrameError::NoColumns(
+            "cycles.prefetch",
+            config.prefetcher.name(),
+        ))?;
         let bvh = &source.tables().bvh;
         Ok(Some(Self {
             algorithm: build.map(|build| build(config, bvh, &hierarchy)),
