@@ -1,11 +1,13 @@
 """Prints a .textrace: a line of JSON with the tables, then one for each record.
 
-    python3 textrace.py FILE [--lists]
+    python3 textrace.py FILE [--lists | --vertex-reads]
 
-With --lists it prints a line for each tile of each view of the geometry instead.
+With --lists it prints a line for each tile of each view of the geometry instead, with --vertex-reads one for each
+texture read of a vertex shader.
 Written from FORMAT.md alone; see container.py.
 """
 
+import struct
 import sys
 
 from container import META, Bytes, check_meta, content_checksum, parse_json, print_line, read
@@ -429,6 +431,38 @@ def read_geometry(chunks, version, draws, passes, frames):
         lists.end()
 
 
+def read_vertex_reads(chunks, version, frames, textures, samplers):
+    """Yields each texture read of a vertex shader."""
+    if version[0] not in (2, 3, 5) or "VTXR" not in chunks:
+        return
+    require(version[1] >= 1, "vertex reads in an older version")
+    require(list(chunks).index("VTXR") > list(chunks).index("PASS"), "vertex reads before the passes")
+    data = Bytes(chunks["VTXR"])
+    before = (0, 0)
+    for _ in range(data.count(17)):
+        frame, draw, eye = data.fields("IIB")
+        require(frame in frames and (frame, draw) >= before and eye in (0, 1, 255), "a draw of vertex reads")
+        before = frame, draw
+        sites = [data.fields("IHBbb") for _ in range(data.count(9))]
+        for texture, sampler, fetches, *_ in sites:
+            require(texture < len(textures) and sampler < len(samplers) and fetches <= 1, "a site")
+        values, last = [0] * 7, (0, 0)
+        for _ in range(data.count(7)):
+            values = [(value + unzigzag(data.number())) % (1 << 32) for value in values]
+            instance, vertex, site, *at, layer, level = values
+            require(site < len(sites) and (instance, vertex) >= last, "a vertex read")
+            last = instance, vertex
+            texture, sampler, fetches, *offset = sites[site]
+            read = {"frame": frame, "eye": {0: "left", 1: "right", 255: None}[eye], "draw": draw}
+            read |= {"instance": instance, "vertex": vertex, "texture": texture, "layer": layer, "offset": offset}
+            if fetches:
+                yield read | {"texel": [i32(value) for value in at], "level": i32(level)}
+            else:
+                *uv, lod = struct.unpack("<3f", struct.pack("<3I", *at, level))
+                yield read | {"sampler": sampler, "uv": uv, "level": lod}
+    data.end()
+
+
 def read_repeats(index, passes):
     """For each pass its own number or that of the earlier pass whose tiles it has."""
     repeats = []
@@ -474,7 +508,10 @@ def main(path, *options):
             listed[of_pass, tile] = set(primitives)
         if "--lists" in options:
             print_line({"view": view, "tile": tile, "primitives": primitives})
-    if "--lists" in options:
+    for listed_read in read_vertex_reads(chunks, version, frames, textures, samplers):
+        if "--vertex-reads" in options:
+            print_line(listed_read)
+    if options:
         return
     index = Bytes(chunks["TIDX"])
     repeats = read_repeats(index, passes) if shared else list(range(len(passes)))

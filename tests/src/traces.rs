@@ -11,8 +11,8 @@ use formats::raytrace::{
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{
     Draw, Encoding, LeftOut, LodRule, NO_GROUP, Pass, PassKind, ProgramCapture, QuadRecord, Sample,
-    SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UnrecordedReads, UvGroup, encode_tile_as,
-    quad_morton,
+    SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UnrecordedReads, UvGroup, VertexDraw,
+    VertexRead, VertexReadCounts, VertexSite, encode_tile_as, quad_morton,
 };
 use formats::texture::{
     ColorSpace, Filter, LodRange, MipFilter, Part, Sampler, TexelFormat, Texture, Wrap,
@@ -158,6 +158,7 @@ pub fn program_tables() -> Tables {
             invocations: 6,
             reads: 12,
         }],
+        vertex_reads: None,
     });
     tables.textures[0].format = TexelFormat::Bc6h;
     tables.textures[0].layers = 6;
@@ -556,6 +557,51 @@ pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     writer.into_bytes(tables).expect("sound tables")
 }
 
+/// A trace of a program with reads of vertex shaders, a number of each of two draws.
+pub fn vertex_trace(reads: u32, seed: u64) -> Vec<u8> {
+    let mut random = Random(seed);
+    let mut tables = program_tables();
+    let draws = [None, Some(Eye::Right)].map(|eye| VertexDraw {
+        frame: 2,
+        eye,
+        draw: 7,
+        sites: (0..3)
+            .map(|texture| VertexSite {
+                texture,
+                sampler: texture as u16,
+                fetches: texture == 1,
+                offset: [-8, texture as i8],
+            })
+            .collect(),
+        reads: (0..reads)
+            .map(|vertex| VertexRead {
+                instance: vertex / 20,
+                vertex: vertex % 20,
+                site: random.below(3),
+                at: [
+                    random.below(u32::MAX),
+                    (random.below(999) as f32 / 7.0).to_bits(),
+                ],
+                layer: random.below(3),
+                level: (random.below(900) as f32 / 100.0 - 1.0).to_bits(),
+            })
+            .collect(),
+    });
+    if let Some(program) = &mut tables.meta.program {
+        program.vertex_reads = VertexReadCounts::of(&draws);
+    }
+    let mut writer = TextraceWriter::in_memory(&tables).expect("sound tables");
+    writer
+        .set_vertex_reads(draws.to_vec())
+        .expect("its tables come last");
+    with_tiles(
+        writer,
+        &tables,
+        Encoding::Delta,
+        &random_tiles(&tables, seed),
+    )
+}
+
 /// Traces of both kinds, with every encoding, with and without visits and optional columns, and with one or
 /// more samples per pixel.
 pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
@@ -572,7 +618,14 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let program = ("program".to_owned(), Kind::Textrace, program);
     let shared = texture_trace_of(&shared_tables(), Encoding::Planes, 5);
     let shared = ("shared".to_owned(), Kind::Textrace, shared);
-    let textures = textures.into_iter().chain([geometry, program, shared]);
+    let read = (
+        "vertex-reads".to_owned(),
+        Kind::Textrace,
+        vertex_trace(60, 5),
+    );
+    let textures = textures
+        .into_iter()
+        .chain([geometry, program, shared, read]);
     let columns = TraversalKind::ALL.map(|tree| {
         let name = format!("columns-{tree:?}").to_lowercase();
         (name, Kind::Raytrace, crate::columns::column_trace(tree, 7))

@@ -149,6 +149,9 @@ fn python_reads_generated_traces_as_replay_does() {
         let path = folder.path().join(&name).with_extension(kind.to_string());
         fs::write(&path, bytes).expect("temporary file");
         assert!(check(&path) > 50, "{}", path.display());
+        if name == "vertex-reads" {
+            assert!(check_with(&path, &["--vertex-reads"]) == 120);
+        }
         if name.starts_with("columns") {
             assert!(check_with(&path, &["--nodes"]) == 60);
             assert!(check_with(&path, &["--slots"]) == 200);

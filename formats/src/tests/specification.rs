@@ -4,7 +4,9 @@
 use crate::container::{CHUNK_ALIGNMENT_BYTES, DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 use crate::raytrace::{GEOMETRY_INDEX_ENTRY_BYTES, RAY_INDEX_ENTRY_BYTES, RayTriangle};
 use crate::records::least_bytes;
-use crate::textrace::{self, Draw, INDEX_ENTRY_BYTES, Pass, Sample, Textrace, UvGroup, geometry};
+use crate::textrace::{
+    self, Draw, INDEX_ENTRY_BYTES, Pass, Sample, Textrace, UvGroup, VertexSite, geometry,
+};
 use crate::texture::{Sampler, Texture};
 use std::collections::HashMap;
 
@@ -60,6 +62,12 @@ fn documented_sizes_equal_those_of_the_code() {
         ("sampler of version 3", least_bytes::<Sampler>(3)),
         ("pass", least_bytes::<Pass>(1)),
         ("tile index entry", INDEX_ENTRY_BYTES),
+        (
+            "draw of vertex reads, without sites and reads",
+            textrace::VERTEX_LEAST_BYTES[0],
+        ),
+        ("site of vertex reads", least_bytes::<VertexSite>(2)),
+        ("vertex read, at least", textrace::VERTEX_LEAST_BYTES[1]),
         ("mesh without indices", geometry::MESH_BYTES),
         ("list index entry", geometry::LIST_INDEX_ENTRY_BYTES),
         ("raw run", textrace::RAW_RUN_BYTES),
@@ -87,6 +95,10 @@ fn documented_fields_add_up() {
     assert_eq!(size("### Sample of version 2"), least_bytes::<Sample>(2));
     assert_eq!(size("### Texture of version 3"), least_bytes::<Texture>(3));
     assert_eq!(size("### Sampler of version 3"), least_bytes::<Sampler>(3));
+    assert_eq!(
+        size("### Site of vertex reads"),
+        least_bytes::<VertexSite>(2)
+    );
     assert_eq!(size("### Pass"), least_bytes::<Pass>(1));
     assert_eq!(size("### Tile index entry"), INDEX_ENTRY_BYTES);
     assert_eq!(

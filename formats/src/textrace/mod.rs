@@ -17,15 +17,17 @@ mod reader;
 mod sampled;
 mod sharing;
 pub mod tables;
+mod vertex_reads;
 mod writer;
 
 pub use bits::PADDING_BYTES as BITS_PADDING_BYTES;
 pub use index::INDEX_ENTRY_BYTES;
 pub use invariant::{TILE_QUADS, quad_morton};
-pub use program::{LeftOut, ProgramCapture, UnrecordedReads};
+pub use program::{LeftOut, ProgramCapture, UnrecordedReads, VertexReadCounts};
 pub use raw::{RECORD_BYTES as RAW_RECORD_BYTES, RUN_BYTES as RAW_RUN_BYTES};
 pub use reader::{Textrace, TileStats};
 pub use sampled::PlannedFrame;
+pub use vertex_reads::{LEAST_BYTES as VERTEX_LEAST_BYTES, VertexDraw, VertexRead, VertexSite};
 pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
 
 use crate::container::ChunkTag;

@@ -1,5 +1,6 @@
 //! The capture of a program: how it was divided, and which texture reads it lacks.
 
+use super::VertexDraw;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -17,6 +18,32 @@ pub struct ProgramCapture {
     /// Texture reads by shaders of other stages, which are not in the trace; missing in older traces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded_reads: Vec<UnrecordedReads>,
+    /// Counts of the vertex reads that are in the trace; absent if it has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex_reads: Option<VertexReadCounts>,
+}
+
+/// Counts of texture reads by vertex shaders.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct VertexReadCounts {
+    /// Executed draws, each once for each view.
+    pub draws: u64,
+    /// Vertices that read.
+    pub vertices: u64,
+    /// Reads.
+    pub reads: u64,
+}
+
+impl VertexReadCounts {
+    /// Counts of draws; `None` if there are none.
+    pub fn of(draws: &[VertexDraw]) -> Option<Self> {
+        let first = draws.first().map(|_| Self::default())?;
+        Some(draws.iter().fold(first, |sum, draw| Self {
+            draws: sum.draws + 1,
+            vertices: sum.vertices + draw.vertices(),
+            reads: sum.reads + draw.reads.len() as u64,
+        }))
+    }
 }
 
 impl ProgramCapture {
@@ -26,7 +53,13 @@ impl ProgramCapture {
         let reads = reads.map(|reads| format!("not in the trace: {reads}"));
         let accesses = self.left_out.iter();
         let accesses = accesses.map(|of| format!("not in the trace, or less exactly: {of}"));
-        reads.chain(accesses).collect()
+        let recorded = self.vertex_reads.map(|of| {
+            format!(
+                "in no cache: reads by vertex shaders, which the trace has ({} draws, {} vertices, {} reads)",
+                of.draws, of.vertices, of.reads
+            )
+        });
+        reads.chain(recorded).chain(accesses).collect()
     }
 }
 
@@ -122,6 +155,7 @@ mod tests {
                 fragments: 0,
             }],
             unrecorded_reads: vec![vertices, dispatches],
+            vertex_reads: None,
             ..ProgramCapture::default()
         };
         assert_eq!(

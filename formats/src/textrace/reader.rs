@@ -5,7 +5,8 @@ use super::geometry::{self, Geometry, TileLists};
 use super::index::{IndexEntry, TILE_CHUNK};
 use super::sharing::{MOST_REPEATS, REPEAT_BYTES};
 use super::{
-    Encoding, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, planes, raw, tables,
+    Encoding, Pass, TILE_INDEX, TILES, Tables, Tile, VertexDraw, delta, invariant, planes, raw,
+    tables, vertex_reads,
 };
 use crate::container::{Container, Kind, MAJOR_4};
 use crate::error::{Broken, Result};
@@ -34,6 +35,7 @@ pub struct Textrace {
     /// First index slot of each pass.
     pass_slots: Vec<usize>,
     geometry: Option<Geometry>,
+    vertex_reads: Vec<VertexDraw>,
 }
 
 impl Textrace {
@@ -92,18 +94,25 @@ impl Textrace {
             }
         }
         let geometry = geometry::read(&container, &tables)?;
+        let vertex_reads = vertex_reads::read(&container, &tables)?;
         Ok(Self {
             container,
             tables,
             index,
             pass_slots,
             geometry,
+            vertex_reads,
         })
     }
 
     /// Meshes and views, if the trace was captured with geometry.
     pub fn geometry(&self) -> Option<&Geometry> {
         self.geometry.as_ref()
+    }
+
+    /// Texture reads of vertex shaders, in the order of execution; none in the trace of a scene.
+    pub fn vertex_reads(&self) -> &[VertexDraw] {
+        &self.vertex_reads
     }
 
     /// The primitive lists of a view of [`Self::geometry`].

@@ -3,7 +3,10 @@
 use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
 use super::sharing::{StoredTiles, repeated_passes};
-use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw, tables};
+use super::{
+    Draw, Encoding, Pass, Tables, Tile, TraceMeta, VertexDraw, delta, invariant, planes, raw,
+    tables, vertex_reads,
+};
 use crate::container::{
     AtomicFile, ContainerWriter, Kind, MAJOR_1, MAJOR_2, MAJOR_3, MAJOR_4, MAJOR_5,
 };
@@ -89,6 +92,7 @@ pub struct TextraceWriter<W = AtomicFile> {
     tile_bytes: u64,
     encoding: Encoding,
     geometry: Option<Spool>,
+    vertex_reads: Vec<VertexDraw>,
 }
 
 impl TextraceWriter<AtomicFile> {
@@ -175,6 +179,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
             tile_bytes: 0,
             encoding: Encoding::default(),
             geometry: None,
+            vertex_reads: Vec::new(),
         })
     }
 
@@ -204,6 +209,16 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// The tables have been written.
     pub fn set_meta(&mut self, meta: TraceMeta) -> Result<()> {
         self.growing("a description")?.meta = meta;
+        Ok(())
+    }
+
+    /// Sets the texture reads of vertex shaders, in the order of execution.
+    ///
+    /// # Errors
+    /// The tables have been written.
+    pub fn set_vertex_reads(&mut self, draws: Vec<VertexDraw>) -> Result<()> {
+        self.growing("vertex reads")?;
+        self.vertex_reads = draws;
         Ok(())
     }
 
@@ -386,6 +401,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
             let major = if self.tables_last { MAJOR_5 } else { MAJOR_4 };
             self.container.set_major(major);
         }
+        vertex_reads::write(&self.vertex_reads, &self.tables, &mut self.container)?;
         Ok(self.container)
     }
 }

@@ -43,6 +43,10 @@ pub struct DumpArgs {
     /// Print primitive lists instead of records: one line per tile of each view captured with --geometry
     #[arg(long, conflicts_with_all = ["pass", "tile"])]
     pub lists: bool,
+    /// Print the texture reads of vertex shaders instead, one line per read, in the order of draws, instances
+    /// and vertices
+    #[arg(long, conflicts_with_all = ["pass", "tile", "lists", "parquet"])]
+    pub vertex_reads: bool,
     /// Print the hierarchy's inner nodes instead, one line per node; in Parquet, one row per child. Needs a
     /// trace captured with `tracegen rays --hierarchy`
     #[arg(long, conflicts_with_all = ["pass", "tile", "lists", "samples"])]
@@ -71,14 +75,20 @@ pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     }
     let trace = notices::open(&args.trace)?;
     let mut out = shell::stdout();
-    match (&trace, args.lists) {
+    match &trace {
         _ if args.nodes || args.slots => hierarchy(&trace, args, &mut out)?,
-        (Trace::Texture(trace), true) => primitive_lists(trace, &mut out)?,
-        (Trace::Ray(_), true) => bail!(
-            "--lists: expected a texture trace, found {}",
+        Trace::Texture(trace) if args.lists => primitive_lists(trace, &mut out)?,
+        Trace::Texture(trace) if args.vertex_reads => vertex_reads(trace, &mut out)?,
+        Trace::Ray(_) if args.lists || args.vertex_reads => bail!(
+            "{}: expected a texture trace, found {}",
+            if args.lists {
+                "--lists"
+            } else {
+                "--vertex-reads"
+            },
             args.trace.display()
         ),
-        (_, false) => dump(&trace, args, &mut out)?,
+        _ => dump(&trace, args, &mut out)?,
     }
     out.flush()?;
     Ok(ExitCode::SUCCESS)
@@ -222,6 +232,36 @@ fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
+/// Prints the texture reads of vertex shaders.
+fn vertex_reads(trace: &Textrace, out: &mut impl Write) -> Result<()> {
+    ensure!(
+        !trace.vertex_reads().is_empty(),
+        "{}: expected a trace with texture reads of vertex shaders, found none",
+        trace.container().file()
+    );
+    for draw in trace.vertex_reads() {
+        for read in &draw.reads {
+            let Some(site) = draw.sites.get(read.site as usize) else {
+                continue;
+            };
+            let mut line = serde_json::json!({
+                "frame": draw.frame, "eye": draw.eye, "draw": draw.draw, "instance": read.instance,
+                "vertex": read.vertex, "texture": site.texture, "layer": read.layer, "offset": site.offset,
+            });
+            if site.fetches {
+                line["texel"] = serde_json::json!(read.at.map(u32::cast_signed));
+                line["level"] = read.level.cast_signed().into();
+            } else {
+                line["sampler"] = site.sampler.into();
+                line["uv"] = serde_json::json!(read.at.map(f32::from_bits));
+                line["level"] = f32::from_bits(read.level).into();
+            }
+            writeln!(out, "{line}")?;
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,6 +279,7 @@ mod tests {
             pass: Some("1".parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
             lists: false,
+            vertex_reads: false,
             nodes: false,
             slots: false,
             parquet: None,
@@ -265,6 +306,7 @@ mod tests {
             pass: Some(pass.parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
             lists: false,
+            vertex_reads: false,
             nodes: false,
             slots: false,
             parquet: Some(path.clone()),
@@ -294,6 +336,7 @@ mod tests {
             pass: Some("9".parse().unwrap()),
             tile: None,
             lists: false,
+            vertex_reads: false,
             nodes: false,
             slots: false,
             parquet: None,

@@ -14,7 +14,9 @@ use formats::raytrace::{Raytrace, RaytraceTables};
 use formats::text::name_of;
 use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
 use formats::texture::{Sampler, Texture};
-use json::{PassJson, RayCounts, Totals, lower, passes, ray_counts, version};
+use json::{
+    PassJson, RayCounts, Totals, VertexReadsJson, lower, passes, ray_counts, version, vertex_reads,
+};
 use report::columns::{Column, Show};
 use report::notices;
 use report::table::Table;
@@ -92,6 +94,10 @@ fn texture_text(trace: &Textrace) -> Result<String> {
     text += &pass_table(trace);
     text += "\n";
     text += &texture_table(&trace.tables().textures);
+    let of_vertices = vertex_reads(trace)?;
+    if !of_vertices.is_empty() {
+        text += &format!("\nvertex texture reads\n{}", vertex_table(&of_vertices));
+    }
     text += &format!(
         "\n{} draws, {} samplers{}; {} records in {} tile bytes, {:.2} bytes per record\n",
         trace.tables().draws.len(),
@@ -157,6 +163,21 @@ fn pass_table(trace: &Textrace) -> String {
         count("bytes", |r: &PassRow| r.1.counts.tile_bytes),
     ];
     Table::new(&columns, &rows).text()
+}
+
+fn vertex_table(rows: &[VertexReadsJson]) -> String {
+    let columns = [
+        count("frame", |r: &VertexReadsJson| r.frame.into()),
+        Column::text("eye", "eye", |r: &VertexReadsJson| {
+            r.eye.map_or("both or none".to_owned(), |eye| lower(&eye))
+        }),
+        count("draws", |r: &VertexReadsJson| r.draws),
+        count("vertices", |r: &VertexReadsJson| r.vertices),
+        count("reads", |r: &VertexReadsJson| r.reads),
+        count("texels", |r: &VertexReadsJson| r.texels),
+        count("lines", |r: &VertexReadsJson| r.lines),
+    ];
+    Table::new(&columns, rows).text()
 }
 
 fn texture_table(textures: &[Texture]) -> String {

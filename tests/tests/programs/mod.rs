@@ -556,7 +556,8 @@ fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
             "--modules",
             modules.to_str().expect("a path"),
         ];
-        capture_program(folder.path(), stereo, &options, &["--stereo", stereo]);
+        let arguments = ["--stereo", stereo, "--also", "vertex"];
+        capture_program(folder.path(), stereo, &options, &arguments);
         let mut valid = 0;
         for entry in std::fs::read_dir(&modules).expect("the modules") {
             let path = entry.expect("an entry").path();
@@ -567,8 +568,8 @@ fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
             );
             valid += 1;
         }
-        // Each module as the program passes it and as the layer rewrites it.
-        assert_eq!(valid, 2 * OBJECTS.len(), "{stereo}");
+        // Each module as the program passes it and as the layer rewrites it, for two stages.
+        assert_eq!(valid, 4 * OBJECTS.len(), "{stereo}");
     }
 }
 

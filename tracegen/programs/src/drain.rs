@@ -6,12 +6,13 @@ mod instances;
 mod places;
 mod portions;
 mod quads;
+mod vertex_reads;
 
 use crate::pairs::pair;
 use crate::session::{Executed, Session, SessionError, coverage_group};
 use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError, Wanted};
 use formats::textrace::{
-    LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
+    LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta, VertexReadCounts,
 };
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
 use frame_builder::{Builder, StereoDraw, primitives};
@@ -22,6 +23,7 @@ use spool::{RawSample, TextureInfo};
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
+use vertex_reads::ShownDraws;
 
 /// What is known about the eyes.
 #[derive(Clone, Debug, Default)]
@@ -122,6 +124,7 @@ pub fn drain<W: Write + Seek>(
     let mut builder = Builder::new(Recorder::new(writer, Vec::new()));
     let mut drained = Drained::default();
     let mut triangles = 0;
+    let mut shown = Vec::new();
     for &number in job.frames {
         let frame = session.drawn(number)?;
         if frame.lost_bytes > 0 {
@@ -171,6 +174,17 @@ pub fn drain<W: Write + Seek>(
         let merged = merge(session, &frame.draws, &views);
         triangles = builder.frame(session, number, &merged, &records, placements, size_px)?;
         builder.count_ignored(session, &frame.draws, &views, &weights);
+        let roles = views.roles.iter().copied();
+        shown.push(ShownDraws {
+            frame: number,
+            draws: frame.draws.iter().copied().zip(roles).collect(),
+            layers: views.layers,
+        });
+    }
+    // After all frames, so that they add their textures behind those of the fragments.
+    let mut vertex_reads = Vec::new();
+    for shown in &shown {
+        vertex_reads.extend(vertex_reads::of_frame(session, &mut builder, shown)?);
     }
     drained.counts = builder.counts;
     drained.eye_fragments = builder.eye_fragments;
@@ -178,8 +192,12 @@ pub fn drain<W: Write + Seek>(
         return Err(DrainError::Nothing);
     }
     drained.program = program(session, job, drained.rule, builder.left_out());
+    drained.program.vertex_reads = VertexReadCounts::of(&vertex_reads);
     let meta = meta(session, job, &drained, triangles, builder.not_opaque());
-    let writer = builder.finish(meta)?;
+    let mut writer = builder.finish(meta)?;
+    writer
+        .set_vertex_reads(vertex_reads)
+        .map_err(RecordError::from)?;
     drained.draws = writer.tables().draws.len();
     drained.textures = writer.tables().textures.len();
     Ok((writer, drained))
@@ -262,6 +280,7 @@ fn program(
         views_by: rule.map_or("", Rule::name).to_owned(),
         left_out,
         unrecorded_reads: session.reads.of_frames(job.frames),
+        vertex_reads: None,
     }
 }
 

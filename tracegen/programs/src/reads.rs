@@ -34,6 +34,16 @@ impl Reads {
         );
     }
 
+    /// Adds recorded reads of the vertices of a draw that a trace cannot have, of a kind of texture.
+    pub fn lost_vertices(&mut self, frame: u32, what: &str, reads: u64) {
+        let of = StageReads {
+            stage: "vertex".to_owned(),
+            what: what.to_owned(),
+            instructions: 1,
+        };
+        self.add(frame, &[of], reads, false);
+    }
+
     fn add(&mut self, frame: u32, reads: &[StageReads], invocations: u64, indirect: bool) {
         for of in reads {
             let key = (of.stage.clone(), of.what.clone());
@@ -110,6 +120,7 @@ mod tests {
                 ..dispatch
             },
         );
+        all.lost_vertices(7, "textures of format 1", 5);
         let counts = |frames: &[u32]| -> Vec<_> {
             let of = all.of_frames(frames).into_iter();
             of.map(|r| (r.stage, [r.commands, r.indirect, r.invocations, r.reads]))
@@ -119,6 +130,7 @@ mod tests {
         let compute = ("compute".to_owned(), [2, 1, 65_536, 65_536]);
         assert_eq!(counts(&[3]), [vertex([2, 0, 90, 180])]);
         assert_eq!(counts(&[3, 4, 9]), [compute, vertex([4, 1, 120, 240])]);
+        assert_eq!(counts(&[7]), [vertex([1, 0, 5, 5])]);
         assert!(counts(&[]).is_empty());
     }
 }

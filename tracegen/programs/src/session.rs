@@ -405,11 +405,30 @@ impl Session {
             || shader.is_some_and(|shader| shader.tests != DepthTests::Either)
     }
 
-    /// Records of a frame by draw, in recording order.
+    /// Records of fragments of a frame by draw, in recording order.
     ///
     /// # Errors
     /// The records cannot be read.
     pub fn records(&mut self, frame: u32) -> Result<HashMap<u32, Vec<RawSample>>, ReadError> {
+        self.records_with(frame, |record| !record.is_vertex())
+    }
+
+    /// Records of vertices of a frame by draw, in recording order.
+    ///
+    /// # Errors
+    /// The records cannot be read.
+    pub fn vertex_records(
+        &mut self,
+        frame: u32,
+    ) -> Result<HashMap<u32, Vec<RawSample>>, ReadError> {
+        self.records_with(frame, RawSample::is_vertex)
+    }
+
+    fn records_with(
+        &mut self,
+        frame: u32,
+        is_wanted: impl Fn(&RawSample) -> bool,
+    ) -> Result<HashMap<u32, Vec<RawSample>>, ReadError> {
         let mut by_draw: HashMap<u32, Vec<RawSample>> = HashMap::new();
         let spans = self
             .frames
@@ -420,6 +439,9 @@ impl Session {
         };
         for (span, new_numbers) in spans {
             reader.read(*span, |mut record| {
+                if !is_wanted(&record) {
+                    return;
+                }
                 record.draw = *new_numbers.get(&record.draw).unwrap_or(&record.draw);
                 by_draw.entry(record.draw).or_default().push(record);
             })?;

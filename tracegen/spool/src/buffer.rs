@@ -27,6 +27,10 @@ pub const MOST_GROUPS: usize = 8;
 pub const FRAGMENT: u32 = 1 << 24;
 /// Number of units of a record of a fragment.
 pub const FRAGMENT_UNITS: u32 = 4;
+/// Header bit of a record of a vertex, which has the units of a fragment's.
+pub const VERTEX: u32 = 1 << 26;
+/// Number of instances of a draw, from 0 on, that records of vertices tell apart.
+pub const MOST_INSTANCES: u32 = 1 << 26;
 /// Header bit of a record of depths.
 pub const DEPTH: u32 = 1 << 25;
 /// Number of units of a record of depths.
@@ -41,9 +45,10 @@ pub struct RawSample {
     pub header: u32,
     /// Number of the draw.
     pub draw: u32,
-    /// Column and row of the quad in the target, 13 bits each, and the view in the bits above.
+    /// Column and row of the quad in the target, 13 bits each, or the instance of a vertex; and the view in the
+    /// bits above.
     pub place: u32,
-    /// Number of the primitive within the draw.
+    /// Number of the primitive within the draw, or of the vertex, with the first vertex of the draw.
     pub primitive: u32,
     /// Element of the binding's array.
     pub element: u32,
@@ -55,6 +60,16 @@ impl RawSample {
     /// Number of the coordinate group in its shader.
     pub fn group(&self) -> u16 {
         self.header as u16
+    }
+
+    /// Whether a vertex shader made the record.
+    pub fn is_vertex(&self) -> bool {
+        self.header & VERTEX != 0
+    }
+
+    /// Instance of a vertex, with the first instance of the draw.
+    pub fn instance(&self) -> u32 {
+        self.place & (MOST_INSTANCES - 1)
     }
 
     /// Lanes of the quad, one bit each.
@@ -152,7 +167,7 @@ pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
             _ => first,
         };
         let mut sample = RawSample {
-            header: header & 0x000f_ffff,
+            header: header & (0x000f_ffff | VERTEX),
             draw,
             place,
             primitive,
@@ -211,7 +226,7 @@ mod tests {
             floats([0.0; 4]),
             floats([0.0; 4]),
             [header(2, 1, 0), 8, 0, 0],
-            [header(6, 4, 0) | FRAGMENT, 8, 0, 1],
+            [header(6, 4, 0) | FRAGMENT | VERTEX, 8, 1 << 26 | 1234, 1],
             [3, 1.0_f32.to_bits(), 2.0_f32.to_bits(), 3.0_f32.to_bits()],
             floats([4.0, 5.0, 6.0, 7.0]),
             floats([8.0, 9.0, 10.0, 0.0]),
@@ -248,6 +263,10 @@ mod tests {
             lod: 10.0,
         };
         assert_eq!((found[3].element, found[3].as_fragment()), (3, fragment));
+        let vertices = found.iter().map(RawSample::is_vertex);
+        assert_eq!(vertices.filter(|is_vertex| *is_vertex).count(), 1);
+        assert!(found[3].is_vertex());
+        assert_eq!((found[3].instance(), found[3].view()), (1234, 1));
         let depths = found[4].as_quad();
         assert_eq!((found[4].quad(), found[4].primitive), ([3, 4], 11));
         assert_eq!(

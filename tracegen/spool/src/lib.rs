@@ -208,7 +208,7 @@ pub struct Span {
     pub count: u64,
 }
 
-/// Fragment shader of a recording pipeline.
+/// Fragment or vertex shader of a recording pipeline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShaderInfo {
     /// Number.
@@ -378,9 +378,15 @@ pub struct DrawInfo {
     pub caveats: Vec<String>,
     /// Textures that its shader may read.
     pub textures: Vec<TextureInfo>,
-    /// Texture reads of the shaders before its fragment shader.
+    /// Texture reads of the shaders before its fragment shader that are not recorded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reads: Vec<StageReads>,
+    /// Number of its recording vertex shader; `None` if its vertices are not recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex_shader: Option<u32>,
+    /// Textures that its recording vertex shader may read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vertex_textures: Vec<TextureInfo>,
 }
 
 #[cfg(test)]

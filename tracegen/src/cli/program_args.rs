@@ -50,7 +50,7 @@ pub struct ProgramArgs {
     /// Size limit of the records of one submission. Unused memory is not allocated.
     #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
     records: u64,
-    /// Folder for the fragment shaders, before and after the recording code is inserted.
+    /// Folder for the recorded shaders, before and after the recording code is inserted.
     #[arg(long, value_name = "FOLDER")]
     modules: Option<PathBuf>,
     /// How the trace's tiles are packed.

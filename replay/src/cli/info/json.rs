@@ -1,18 +1,20 @@
 //! The counts of a trace, and the JSON of `replay info`.
 
 use crate::cli::tiles::{ray_tiles, tiles};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use formats::Trace;
 use formats::container::{ChunkEntry, Container};
+use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{
     BvhSummary, RayKind, RayLight, RayMaterial, RayTile, RayTriangle, Raytrace, RaytraceMeta,
 };
-use formats::textrace::{Draw, Encoding, Pass, Textrace, TraceMeta};
+use formats::textrace::{Draw, Encoding, Pass, Textrace, TraceMeta, VertexDraw};
 use formats::texture::{Sampler, Texture};
 use formats::view::Eye;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
+use std::collections::{BTreeMap, HashSet};
 
 /// Schema of the object that `replay info --json` prints.
 const SCHEMA: &str = "replay.info/2";
@@ -63,6 +65,9 @@ struct TextureJson<'a> {
     meta: &'a TraceMeta,
     totals: Totals,
     passes: Vec<PassJson<'a>>,
+    /// Texture reads of vertex shaders by frame and eye; absent if the trace has none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    vertex_reads: Vec<VertexReadsJson>,
     /// The trace's chunk TEXS (FORMAT.md).
     #[cfg_attr(test, schemars(with = "Vec<Map<String, Value>>"))]
     textures: &'a [Texture],
@@ -110,6 +115,7 @@ pub fn to_json(trace: &Trace) -> Result<Value> {
                 meta: &tables.meta,
                 totals: Totals::of(trace)?,
                 passes: passes(trace),
+                vertex_reads: vertex_reads(trace)?,
                 textures: &tables.textures,
                 samplers: &tables.samplers,
                 draws: &tables.draws,
@@ -262,6 +268,61 @@ pub(super) fn passes(trace: &Textrace) -> Vec<PassJson<'_>> {
             }
         })
         .collect()
+}
+
+/// Texture reads of vertex shaders for an eye of a frame.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(super) struct VertexReadsJson {
+    pub frame: u32,
+    /// `left`, `right`, or `null` if the draws are for both eyes or for no eye's target.
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub eye: Option<Eye>,
+    pub draws: u64,
+    pub vertices: u64,
+    pub reads: u64,
+    /// Different texels that these reads touch.
+    pub texels: u64,
+    /// Lines of 64 bytes with these texels, where the default layout of textures places them.
+    pub lines: u64,
+}
+
+pub(super) fn vertex_reads(trace: &Textrace) -> Result<Vec<VertexReadsJson>> {
+    if trace.vertex_reads().is_empty() {
+        return Ok(Vec::new());
+    }
+    let layout = Layout::new(&trace.tables().textures, &LayoutConfig::default());
+    let layout = layout.map_err(|error| anyhow!("{}: {error}", trace.container().file()))?;
+    let mut by_eye: BTreeMap<_, Vec<&VertexDraw>> = BTreeMap::new();
+    for draw in trace.vertex_reads() {
+        let eye = draw.eye.map_or(2, |eye| eye as u8);
+        by_eye.entry((draw.frame, eye)).or_default().push(draw);
+    }
+    let of = by_eye.into_values().map(|draws| {
+        let (mut texels, mut lines) = (HashSet::new(), HashSet::new());
+        for draw in &draws {
+            draw.footprints(trace.tables(), |site, of| {
+                for texel in of.texels() {
+                    let place = (site.texture, of.layer, of.level, texel);
+                    if texels.insert(place) {
+                        let (layer, level) = (of.layer.into(), of.level.into());
+                        let address = layout.address(site.texture, layer, level, texel);
+                        lines.extend(address.map(|address| address / 64));
+                    }
+                }
+            });
+        }
+        VertexReadsJson {
+            frame: draws[0].frame,
+            eye: draws[0].eye,
+            draws: draws.len() as u64,
+            vertices: draws.iter().map(|draw| draw.vertices()).sum(),
+            reads: draws.iter().map(|draw| draw.reads.len() as u64).sum(),
+            texels: texels.len() as u64,
+            lines: lines.len() as u64,
+        }
+    });
+    Ok(of.collect())
 }
 
 /// Ray and traversal counts of one eye.

@@ -19,7 +19,8 @@ const SAMPLER: vk::DescriptorType = vk::DescriptorType::SAMPLER;
 const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
 
 /// Bindings of the second set; see `shaders`.
-const TEXTURES: [vk::DescriptorType; 7] = [IMAGE, SAMPLER, IMAGE, IMAGE, IMAGE, IMAGE, SAMPLER];
+const TEXTURES: [vk::DescriptorType; 8] =
+    [IMAGE, SAMPLER, IMAGE, IMAGE, IMAGE, IMAGE, SAMPLER, SAMPLER];
 
 impl Sets {
     pub fn new(gpu: &Gpu, eyes: &Buffer) -> Result<Self> {
@@ -97,19 +98,23 @@ fn write(gpu: &Gpu, sets: [vk::DescriptorSet; 2], eyes: &Buffer) -> Result<()> {
             .image_view(image.view)
             .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)
     });
-    let sampler = |mode| {
+    let sampler = |mode, filter| {
         let info = vk::SamplerCreateInfo::default()
             .address_mode_u(mode)
             .address_mode_v(mode)
+            .mag_filter(filter)
+            .min_filter(filter)
             .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
             .max_lod(vk::LOD_CLAMP_NONE);
         // SAFETY: the device is open.
         let sampler = checked("a sampler", unsafe { device.create_sampler(&info, None) })?;
         Ok::<_, String>(vk::DescriptorImageInfo::default().sampler(sampler))
     };
-    let nearest = sampler(vk::SamplerAddressMode::REPEAT)?;
-    let bordered = sampler(vk::SamplerAddressMode::CLAMP_TO_BORDER)?;
-    let infos = [flat, nearest, other, layered, sky, volume, bordered];
+    use vk::{Filter, SamplerAddressMode as Mode};
+    let nearest = sampler(Mode::REPEAT, Filter::NEAREST)?;
+    let bordered = sampler(Mode::CLAMP_TO_BORDER, Filter::NEAREST)?;
+    let linear = sampler(Mode::REPEAT, Filter::LINEAR)?;
+    let infos = [flat, nearest, other, layered, sky, volume, bordered, linear];
     let mut writes = vec![
         vk::WriteDescriptorSet::default()
             .dst_set(sets[0])

@@ -15,6 +15,7 @@ struct Eyes { clip_from_world: array<mat4x4<f32>, 2> }
 @group(1) @binding(4) var sky: texture_cube<f32>;
 @group(1) @binding(5) var volume: texture_3d<f32>;
 @group(1) @binding(6) var bordered: sampler;
+@group(1) @binding(7) var linear: sampler;
 struct Constants { eye: u32, scale: f32 }
 var<immediate> constants: Constants;
 struct Fragment {
@@ -26,10 +27,27 @@ struct Fragment {
 
 /// SPIR-V of an object's vertex and fragment shader, with entry points `vertex` and `fragment`.
 ///
-/// With `reads`, the vertex shader also reads a texel, which changes no vertex.
+/// With `reads`, the vertex shader also fetches and samples texels, which changes no vertex.
 pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, String> {
     let read = match reads {
-        true => "out.uv = out.uv + vec2<f32>(min(textureLoad(flat, vec2<i32>(0, 0), 0).x, 0.0));",
+        // Within the textures; beyond texels, levels and layers; gathered; and of a kind that is not recorded.
+        true => {
+            "let n = i32(number);
+            var sum = textureLoad(flat, vec2<i32>(n % 4, 2), 0);
+            let corner = vec2<f32>(f32(n % 2 + 1), 8.0) / 32.0;
+            sum += textureSampleLevel(layered, linear, corner, n % 3, 1.0);
+            sum += textureLoad(flat, vec2<i32>(n % 3 - 1, 0), n % 9);
+            sum += textureLoad(layered, vec2<i32>(0, 0), n % 6 - 1, 1);
+            let inside = vec2<f32>((f32(n % 2) + 0.3) / 8.0, 0.3);
+            sum += textureSampleLevel(layered, linear, inside, n % 6 - 1, f32(n % 9) - 1.0);
+            sum += textureGather(0, flat, nearest, corner);
+            sum += textureLoad(volume, vec3<i32>(0, 0, 0), 0);
+            out.uv += vec2<f32>(min(sum.x, 0.0));"
+        }
+        false => "",
+    };
+    let number = match reads {
+        true => ", @builtin(vertex_index) number: u32",
         false => "",
     };
     let eye = match stereo {
@@ -44,7 +62,7 @@ pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, S
         "{HEAD}
         @vertex fn vertex(
             @location(0) place: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) direction: vec3<f32>,
-            @builtin(instance_index) instance: u32{eye}
+            @builtin(instance_index) instance: u32{eye}{number}
         ) -> Fragment {{
             var out: Fragment;
             // Each instance is nearer than the one before.

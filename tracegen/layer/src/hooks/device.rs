@@ -8,7 +8,7 @@ use super::pending::{Pending, read_ended};
 use super::pictures::Pictures;
 use super::queries::Queries;
 use crate::capture::{Capture, capture, lock};
-use crate::inject::Target;
+use crate::inject::{ReadCounts, Target};
 use crate::record_buffer::RecordBuffer;
 use crate::track::Tracker;
 use ash::vk;
@@ -52,14 +52,16 @@ pub(super) struct DeviceRecorder {
     pub shaders: Mutex<HashMap<ShaderKey, Result<RecordingShader, String>>>,
 }
 
-/// Words of a module, name of its entry point, and whether it renders several views.
-pub(super) type ShaderKey = (Arc<[u32]>, String, bool);
+/// Words of a module, name of its entry point, whether it renders several views, and whether it is a vertex shader.
+pub(super) type ShaderKey = (Arc<[u32]>, String, bool, bool);
 
 /// A recording shader and its module.
 #[derive(Clone)]
 pub(super) struct RecordingShader {
     pub words: Arc<[u32]>,
     pub info: Arc<ShaderInfo>,
+    /// Texture reads of a vertex shader that it does not record.
+    pub unrecorded: ReadCounts,
 }
 
 impl DeviceRecorder {

@@ -57,6 +57,9 @@ fn plan(device: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan>
     if twice && counts_itself {
         info.shader = None;
         info.twice = false;
+        info.vertex_shader = None;
+        info.vertex_textures.clear();
+        info.reads = pipeline.unrecorded_reads(false);
         info.unrecorded = Some("a query of the program counts the draw".to_owned());
     }
     let plan = Plan {

@@ -229,7 +229,8 @@ fn describe(device: &Device, items: &[Executed]) {
             images.extend(pass.colors.iter().chain(&pass.depth).map(|view| view.image));
             capture.write(|w| w.describe("pass", pass.pass, || Event::Pass((**pass).clone())));
         }
-        let views = draw.textures.iter().filter_map(|texture| texture.view);
+        let views = draw.textures.iter().chain(&draw.vertex_textures);
+        let views = views.filter_map(|texture| texture.view);
         images.extend(views.map(|view| view.image));
         for image in images {
             let info = device.tracker().images.numbered(image).cloned();
@@ -237,7 +238,7 @@ fn describe(device: &Device, items: &[Executed]) {
                 capture.write(|w| w.describe("image", image, || Event::Image((*info).clone())));
             }
         }
-        if let Some(shader) = draw.shader {
+        for shader in [draw.shader, draw.vertex_shader].into_iter().flatten() {
             let info = device.shader(shader);
             if let Some(info) = info {
                 capture.write(|w| w.describe("shader", shader, || Event::Shader((*info).clone())));

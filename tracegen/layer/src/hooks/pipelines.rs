@@ -99,17 +99,18 @@ fn extended_ranges(
     }
     let mut ranges = ranges.to_vec();
     // A stage must not be in two ranges.
-    let fragment = vk::ShaderStageFlags::FRAGMENT;
-    match ranges
-        .iter_mut()
-        .find(|range| range.stage_flags.contains(fragment))
-    {
-        Some(range) => range.size = offset + BYTES - range.offset,
-        None => ranges.push(vk::PushConstantRange {
-            stage_flags: fragment,
-            offset,
-            size: BYTES,
-        }),
+    for stage in [vk::ShaderStageFlags::FRAGMENT, vk::ShaderStageFlags::VERTEX] {
+        match ranges
+            .iter_mut()
+            .find(|range| range.stage_flags.contains(stage))
+        {
+            Some(range) => range.size = offset + BYTES - range.offset,
+            None => ranges.push(vk::PushConstantRange {
+                stage_flags: stage,
+                offset,
+                size: BYTES,
+            }),
+        }
     }
     let stages = ranges.iter().filter(|range| end(range) > offset);
     let stages = stages.fold(vk::ShaderStageFlags::empty(), |all, range| {
@@ -151,9 +152,9 @@ mod tests {
         let (ranges, stages) = extended_ranges(&[], 252).unwrap();
         assert_eq!(
             (ranges.len(), ranges[0].offset, ranges[0].size),
-            (1, 252, 4)
+            (2, 252, 4)
         );
-        assert_eq!(stages, Stages::FRAGMENT);
+        assert_eq!(stages, Stages::FRAGMENT | Stages::VERTEX);
         let vertex = range(Stages::VERTEX, 0, 64);
         let both = range(Stages::GEOMETRY | Stages::FRAGMENT, 64, 16);
         let (ranges, stages) = extended_ranges(&[vertex, both], 252).unwrap();
@@ -161,7 +162,8 @@ mod tests {
             (ranges.len(), ranges[1].offset, ranges[1].size),
             (2, 64, 192)
         );
-        assert_eq!(stages, Stages::GEOMETRY | Stages::FRAGMENT);
+        assert_eq!((ranges[0].offset, ranges[0].size), (0, 256));
+        assert_eq!(stages, Stages::GEOMETRY | Stages::FRAGMENT | Stages::VERTEX);
         assert!(extended_ranges(&[range(Stages::VERTEX, 250, 4)], 252).is_none());
     }
 }

@@ -6,10 +6,9 @@ use super::libraries::{self, LinkedLibrary, Parts};
 use super::pipeline_state::{self, Changed};
 use super::recording_shaders::{recording_shader, without_module};
 use super::stage_reads;
-use crate::track::{Library, Pipeline, Recorded, State};
+use crate::track::{Library, Pipeline, Recorded, RecordedVertex, State, VERTEX};
 use ash::vk;
-use spool::ShaderInfo;
-use spool::{DepthTests, What};
+use spool::{DepthTests, ShaderInfo, What};
 use std::sync::Arc;
 
 /// What the tracker keeps of a description.
@@ -18,31 +17,12 @@ pub(super) enum Described {
     Library(Library),
 }
 
-/// Fragment shader of a description: its own, or that of a library.
-enum Fragment<'a> {
-    None,
-    Own(Box<OwnFragment<'a>>),
-    Linked(Arc<ShaderInfo>),
-    Unrecorded(String),
-}
-
-struct OwnFragment<'a> {
+/// A stage of a description, and its recording shader.
+struct OwnShader<'a> {
     /// Index of the stage.
     place: usize,
     stage: vk::PipelineShaderStageCreateInfo<'a>,
     shader: RecordingShader,
-}
-
-impl Fragment<'_> {
-    /// Shader, or the reason why it is not recorded; `None` if there is no fragment shader.
-    fn shader(&self) -> Option<Result<Arc<ShaderInfo>, String>> {
-        match self {
-            Self::None => None,
-            Self::Own(own) => Some(Ok(Arc::clone(&own.shader.info))),
-            Self::Linked(shader) => Some(Ok(Arc::clone(shader))),
-            Self::Unrecorded(why) => Some(Err(why.clone())),
-        }
-    }
 }
 
 /// Describes a pipeline or library of the program and creates its recording pipelines.
@@ -69,21 +49,24 @@ pub(super) unsafe fn describe(
                 layout = library.layout;
             }
         }
-        let fragment = match &device.recorder {
-            Some(recorder) => fragment(device, recorder, info, own, &links),
-            None => Fragment::None,
-        };
+        let mut shaders = Vec::new();
+        let (mut fragment, mut vertex) = (None, None);
+        if let Some(recorder) = &device.recorder {
+            fragment = self::fragment(device, recorder, info, own, &links, &mut shaders);
+            vertex = self::vertex(device, recorder, info, own, &links, &state, &mut shaders);
+        }
         if libraries::is_library(info) {
             let library = Library {
                 parts,
                 state,
                 layout,
-                shader: fragment.shader(),
+                shader: fragment,
+                vertex,
                 ..Library::default()
             };
-            return Described::Library(with_variants(device, info, &links, &fragment, library));
+            return Described::Library(with_variants(device, info, &links, &shaders, library));
         }
-        let pipeline = Pipeline {
+        let mut pipeline = Pipeline {
             number: 0,
             layout,
             stages: number_stages(device, layout),
@@ -92,7 +75,21 @@ pub(super) unsafe fn describe(
             bindings: Vec::new(),
             state,
         };
-        Described::Pipeline(recorded(device, info, &links, &fragment, pipeline))
+        let made = match fragment {
+            Some(Ok(shader)) => recorded(
+                device,
+                info,
+                &links,
+                &shaders,
+                shader,
+                vertex,
+                &mut pipeline,
+            ),
+            Some(Err(why)) => Err(why),
+            None => Ok(()),
+        };
+        pipeline.unrecorded = made.err();
+        Described::Pipeline(pipeline)
     }
 }
 
@@ -103,7 +100,8 @@ fn number_stages(device: &Device, layout: vk::PipelineLayout) -> vk::ShaderStage
     layout.map(|layout| layout.stages).unwrap_or_default()
 }
 
-/// The fragment shader of a description.
+/// The recording fragment shader of a description or of its libraries, or the reason why there is none; `None`
+/// without a fragment shader. Its own one is added to `shaders`.
 ///
 /// # Safety
 /// A valid description with these own parts and libraries.
@@ -113,32 +111,28 @@ unsafe fn fragment<'a>(
     info: &vk::GraphicsPipelineCreateInfo<'a>,
     own: Parts,
     links: &[LinkedLibrary],
-) -> Fragment<'a> {
+    shaders: &mut Vec<OwnShader<'a>>,
+) -> Option<Result<Arc<ShaderInfo>, String>> {
     if !own.contains(Parts::FRAGMENT_SHADER) {
-        let mut shaders = links.iter().filter_map(|(_, l)| l.as_ref()?.shader.clone());
-        return match shaders.next() {
-            Some(Ok(shader)) => Fragment::Linked(shader),
-            Some(Err(why)) => Fragment::Unrecorded(why),
-            None => Fragment::None,
-        };
+        return links.iter().find_map(|(_, l)| l.as_ref()?.shader.clone());
     }
     // SAFETY: as the caller promises.
     unsafe {
-        let Some((place, stage)) = fragment_stage(info, own) else {
-            return Fragment::None;
-        };
+        let (place, stage) = fragment_stage(info, own)?;
         if number_stages(device, info.layout).is_empty() {
-            return Fragment::Unrecorded("push constants without room for a number".to_owned());
+            return Some(Err("push constants without room for a number".to_owned()));
         }
         let multiview = view_mask(device, info) != 0;
-        match recording_shader(device, recorder, &stage, multiview) {
-            Ok(shader) => Fragment::Own(Box::new(OwnFragment {
+        let shader = recording_shader(device, recorder, &stage, multiview);
+        Some(shader.map(|shader| {
+            let info = Arc::clone(&shader.info);
+            shaders.push(OwnShader {
                 place,
                 stage,
                 shader,
-            })),
-            Err(why) => Fragment::Unrecorded(why),
-        }
+            });
+            info
+        }))
     }
 }
 
@@ -166,6 +160,55 @@ unsafe fn fragment_stage<'a>(
     }
 }
 
+/// The recording vertex shader of a description or of its libraries; `None` if no read can be recorded. Its own one
+/// is added to `shaders`.
+///
+/// # Safety
+/// A valid description with these own parts, libraries and state.
+unsafe fn vertex<'a>(
+    device: &Device,
+    recorder: &DeviceRecorder,
+    info: &vk::GraphicsPipelineCreateInfo<'a>,
+    own: Parts,
+    links: &[LinkedLibrary],
+    state: &State,
+    shaders: &mut Vec<OwnShader<'a>>,
+) -> Option<RecordedVertex> {
+    if !own.contains(Parts::PRE_RASTERIZATION_SHADERS) {
+        return links.iter().find_map(|(_, l)| l.as_ref()?.vertex.clone());
+    }
+    let wanted = vk::ShaderStageFlags::VERTEX;
+    let sees_number = number_stages(device, info.layout).contains(wanted);
+    if !sees_number || !state.reads.iter().any(|of| of.stage == VERTEX) {
+        return None;
+    }
+    // SAFETY: as the caller promises.
+    let (place, stage, shader) = unsafe {
+        let mut stages = slice(info.p_stages, info.stage_count).iter().enumerate();
+        let (place, stage) = stages.find(|(_, stage)| stage.stage == wanted)?;
+        let multiview = view_mask(device, info) != 0;
+        let shader = recording_shader(device, recorder, stage, multiview).ok()?;
+        (place, *stage, shader)
+    };
+    if shader.info.sites.is_empty() {
+        return None;
+    }
+    let unrecorded = shader.unrecorded.iter();
+    let recorded = RecordedVertex {
+        bindings: bindings(&shader.info),
+        shader: Arc::clone(&shader.info),
+        unrecorded: unrecorded
+            .map(|(what, count)| stage_reads::reads_of(VERTEX, what, *count))
+            .collect(),
+    };
+    shaders.push(OwnShader {
+        place,
+        stage,
+        shader,
+    });
+    Some(recorded)
+}
+
 /// View mask of the draws of a pipeline.
 ///
 /// # Safety
@@ -185,48 +228,39 @@ unsafe fn view_mask(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) 
 /// Creates the recording pipeline of a complete pipeline.
 ///
 /// # Safety
-/// A valid description with these libraries and this fragment shader.
+/// A valid description with these libraries and recording shaders.
 unsafe fn recorded(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[LinkedLibrary],
-    fragment: &Fragment<'_>,
-    mut pipeline: Pipeline,
-) -> Pipeline {
-    let shader = match fragment.shader() {
-        Some(Ok(shader)) => shader,
-        Some(Err(why)) => {
-            pipeline.unrecorded = Some(why);
-            return pipeline;
-        }
-        None => return pipeline,
-    };
+    shaders: &[OwnShader<'_>],
+    shader: Arc<ShaderInfo>,
+    vertex: Option<RecordedVertex>,
+    pipeline: &mut Pipeline,
+) -> Result<(), String> {
     let twice = is_drawn_twice(&shader, &pipeline.state);
     // SAFETY: as the caller promises.
-    match unsafe { variant(device, info, links, fragment, twice) } {
-        Ok((handle, fixed)) => {
-            pipeline.bindings = bindings(&shader);
-            pipeline.recorded = Some(Recorded {
-                handle,
-                shader,
-                twice,
-                fixed,
-            });
-        }
-        Err(why) => pipeline.unrecorded = Some(why),
-    }
-    pipeline
+    let (handle, fixed) = unsafe { variant(device, info, links, shaders, twice) }?;
+    pipeline.bindings = bindings(&shader);
+    pipeline.recorded = Some(Recorded {
+        handle,
+        shader,
+        twice,
+        fixed,
+        vertex,
+    });
+    Ok(())
 }
 
 /// Creates the variants of a library that recording pipelines are linked from.
 ///
 /// # Safety
-/// A valid description of a library with these libraries and this fragment shader.
+/// A valid description of a library with these libraries and recording shaders.
 unsafe fn with_variants(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[LinkedLibrary],
-    fragment: &Fragment<'_>,
+    shaders: &[OwnShader<'_>],
     mut library: Library,
 ) -> Library {
     let tests = match &library.shader {
@@ -234,16 +268,17 @@ unsafe fn with_variants(
         Some(Err(_)) => return library,
         None => None,
     };
+    let vertex = library.vertex.is_some();
     let outputs = library.parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
     // Alpha-to-coverage is a property of the fragment output, which may be in another library.
     let (once, twice) = match tests {
         Some(DepthTests::Early | DepthTests::Late) => (true, false),
         Some(DepthTests::EarlyLateWrite) => (false, true),
         Some(DepthTests::Either) => (true, true),
-        None => (false, outputs && device.recorder.is_some()),
+        None => (vertex, vertex || outputs && device.recorder.is_some()),
     };
     // SAFETY: as the caller promises.
-    let make = |quiet| unsafe { variant(device, info, links, fragment, quiet) };
+    let make = |quiet| unsafe { variant(device, info, links, shaders, quiet) };
     if once {
         match make(false) {
             Ok((handle, _)) => library.recording = Some(handle),
@@ -285,29 +320,36 @@ fn bindings(shader: &ShaderInfo) -> Vec<(u32, u32)> {
     bindings
 }
 
-/// Creates a pipeline or library with the recording shader and, if requested, without writes. Also returns the
+/// Creates a pipeline or library with its recording shaders and, if requested, without writes. Also returns the
 /// dynamic states that it fixes.
 ///
 /// # Safety
-/// A valid description with these libraries and this fragment shader.
+/// A valid description with these libraries and recording shaders.
 unsafe fn variant(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[LinkedLibrary],
-    fragment: &Fragment<'_>,
+    shaders: &[OwnShader<'_>],
     quiet: bool,
 ) -> Result<(vk::Pipeline, Vec<vk::DynamicState>), String> {
     // SAFETY: as the caller promises. Objects derived from the description live until the end of the call.
     unsafe {
         let mut stages = slice(info.p_stages, info.stage_count).to_vec();
-        let mut module = vk::ShaderModule::null();
-        if let Fragment::Own(own) = fragment {
-            module = create_module(device, &own.shader)?;
-            stages[own.place].module = module;
-            stages[own.place].p_next = without_module(own.stage.p_next);
+        let mut modules = Vec::with_capacity(shaders.len());
+        let mut made = Ok(());
+        for own in shaders {
+            made = made.and_then(|()| {
+                let module = create_module(device, &own.shader)?;
+                modules.push(module);
+                stages[own.place].module = module;
+                stages[own.place].p_next = without_module(own.stage.p_next);
+                Ok(())
+            });
         }
-        let made = linked(device, info, stages, links, quiet);
-        (device.next.destroy_shader_module)(device.handle, module, std::ptr::null());
+        let made = made.and_then(|()| linked(device, info, stages, links, quiet));
+        for module in modules {
+            (device.next.destroy_shader_module)(device.handle, module, std::ptr::null());
+        }
         made
     }
 }

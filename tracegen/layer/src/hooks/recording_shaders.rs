@@ -5,6 +5,7 @@ use super::device::{Device, DeviceRecorder, RecordingShader};
 use crate::capture::{capture, lock};
 use crate::inject::instrument;
 use ash::vk;
+use rspirv::spirv::ExecutionModel;
 use spool::ShaderInfo;
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,7 +34,7 @@ pub(super) unsafe fn module_of(
     }
 }
 
-/// The recording shader of a fragment stage.
+/// The recording shader of a fragment stage or a vertex stage.
 ///
 /// # Safety
 /// A valid stage.
@@ -45,14 +46,19 @@ pub(super) unsafe fn recording_shader(
 ) -> Result<RecordingShader, String> {
     // SAFETY: as the caller promises.
     let (words, entry) = unsafe { module_of(device, stage) }?;
-    let key = (words, entry, multiview);
+    let is_vertex = stage.stage == vk::ShaderStageFlags::VERTEX;
+    let key = (words, entry, multiview, is_vertex);
     if let Some(made) = lock(&recorder.shaders).get(&key) {
         return made.clone();
     }
     let target = recorder.target(multiview);
     // A module that cannot be rewritten must not end the program.
     let made = catch_unwind(AssertUnwindSafe(|| {
-        instrument(&key.0, Some(&key.1), &target)
+        let model = match is_vertex {
+            true => ExecutionModel::Vertex,
+            false => ExecutionModel::Fragment,
+        };
+        instrument(&key.0, Some(&key.1), model, &target)
     }))
     .unwrap_or(Err(crate::inject::InjectError::Malformed("a panic")))
     .map_err(|error| error.to_string())
@@ -67,6 +73,7 @@ pub(super) unsafe fn recording_shader(
                 tests: recording.tests,
                 sites: recording.sites,
             }),
+            unrecorded: recording.unrecorded,
         }
     });
     lock(&recorder.shaders).insert(key, made.clone());

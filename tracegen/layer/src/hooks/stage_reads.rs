@@ -6,7 +6,7 @@ use super::draws::is_wanted;
 use super::libraries::Parts;
 use super::recording_shaders::module_of;
 use crate::inject::{InjectError, texel_reads, workgroup_size};
-use crate::track::Compute;
+use crate::track::{Compute, VERTEX};
 use ash::vk::{self, Handle};
 use rspirv::spirv::ExecutionModel;
 use spool::{DispatchInfo, StageReads};
@@ -18,7 +18,7 @@ const STAGES: [(vk::ShaderStageFlags, ExecutionModel, &str); 5] = {
     use {ExecutionModel as Model, vk::ShaderStageFlags as Stage};
     let (control, evaluation) = (Model::TessellationControl, Model::TessellationEvaluation);
     [
-        (Stage::VERTEX, Model::Vertex, "vertex"),
+        (Stage::VERTEX, Model::Vertex, VERTEX),
         (Stage::TESSELLATION_CONTROL, control, "tessellation control"),
         (
             Stage::TESSELLATION_EVALUATION,
@@ -54,12 +54,17 @@ unsafe fn of_stage(
     let unknown = || BTreeMap::from([("shaders that cannot be analysed".to_owned(), 0)]);
     let counts = counts.unwrap_or_else(unknown).into_iter();
     counts
-        .map(|(what, instructions)| StageReads {
-            stage: (*name).to_owned(),
-            what,
-            instructions,
-        })
+        .map(|(what, instructions)| reads_of(name, &what, instructions))
         .collect()
+}
+
+/// Image instructions of a stage for a kind of texture.
+pub(super) fn reads_of(stage: &str, what: &str, instructions: u32) -> StageReads {
+    StageReads {
+        stage: stage.to_owned(),
+        what: what.to_owned(),
+        instructions,
+    }
 }
 
 /// Texture reads of the own stages of a graphics pipeline before its fragment shader.

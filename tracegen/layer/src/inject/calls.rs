@@ -13,7 +13,7 @@ use std::collections::HashMap;
 pub(super) struct CallEmitter {
     pub builder: Builder,
     types: Types,
-    frag_coord: Input,
+    place: Input,
     zero: Word,
     uzero: Word,
     functions: Functions,
@@ -34,7 +34,7 @@ impl CallEmitter {
         let inputs = Inputs::new(&mut builder, shader, target, types)?;
         Ok(Self {
             types,
-            frag_coord: inputs.frag_coord,
+            place: inputs.place,
             zero: builder.constant_bit32(types.f32, 0),
             uzero: builder.constant_bit32(types.u32, 0),
             functions: Functions::new(&mut builder, types, inputs, target, vulkan_memory),
@@ -87,7 +87,7 @@ impl CallEmitter {
         group: u16,
         out: &mut Vec<Instruction>,
     ) -> Result<(), InjectError> {
-        let Input { variable, of } = self.frag_coord;
+        let Input { variable, of } = self.place;
         let place = self.put(out, Op::Load, of, vec![id(variable)]);
         let depth = self.extracted(place, 2, out);
         let function = match self.depth {

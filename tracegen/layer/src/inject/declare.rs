@@ -54,9 +54,12 @@ pub(super) struct Input {
     pub of: Word,
 }
 
-/// Inputs that identify a fragment.
+/// Inputs that identify a fragment or a vertex.
 pub(super) struct Inputs {
-    pub frag_coord: Input,
+    pub is_vertex: bool,
+    /// `FragCoord`, or `InstanceIndex` in a vertex shader.
+    pub place: Input,
+    /// `PrimitiveId`, or `VertexIndex` in a vertex shader.
     pub primitive: Input,
     pub view: Option<Input>,
     /// Index of the lane in the subgroup, if ballots are used.
@@ -85,21 +88,27 @@ impl Inputs {
         target: &Target,
         types: Types,
     ) -> Result<Self, InjectError> {
+        let is_vertex = shader.is_vertex();
         let mut interface = Vec::new();
         let mut input = |builder: &mut Builder, builtin: BuiltIn, of: Word, flat: bool| {
             existing_input(shader, builtin).unwrap_or_else(|| {
                 let pointer = builder.type_pointer(None, StorageClass::Input, of);
                 let variable = builder.variable(pointer, None, StorageClass::Input, None);
                 builder.decorate(variable, Decoration::BuiltIn, [Operand::BuiltIn(builtin)]);
-                if flat {
+                // Inputs of vertex shaders must not be flat.
+                if flat && !is_vertex {
                     builder.decorate(variable, Decoration::Flat, []);
                 }
                 interface.push(variable);
                 Input { variable, of }
             })
         };
-        let frag_coord = input(builder, BuiltIn::FragCoord, types.vec4, false);
-        let primitive = input(builder, BuiltIn::PrimitiveId, types.u32, true);
+        let (place, of_place, primitive) = match is_vertex {
+            true => (BuiltIn::InstanceIndex, types.u32, BuiltIn::VertexIndex),
+            false => (BuiltIn::FragCoord, types.vec4, BuiltIn::PrimitiveId),
+        };
+        let place = input(builder, place, of_place, is_vertex);
+        let primitive = input(builder, primitive, types.u32, true);
         let view = (target.multiview).then(|| input(builder, BuiltIn::ViewIndex, types.u32, true));
         let invocation = (target.ballots)
             .then(|| input(builder, BuiltIn::SubgroupLocalInvocationId, types.u32, true));
@@ -121,7 +130,8 @@ impl Inputs {
         let entry = entry.ok_or(InjectError::NoFragmentEntry)?;
         entry.operands.extend(interface.into_iter().map(id));
         Ok(Self {
-            frag_coord,
+            is_vertex,
+            place,
             primitive,
             view,
             invocation,

@@ -39,17 +39,22 @@ impl Functions {
         }
     }
 
-    /// `void begin()`: computes what all records of a fragment have in common.
+    /// `void begin()`: computes what all records of a fragment or a vertex have in common.
     pub fn begin(&self, builder: &mut Builder) -> Result {
         let (mut w, function, _) = Writer::begin(builder, self.types, &[])?;
         let w = &mut w;
-        let place = lanes::place(w, &self.inputs);
+        let place = match self.inputs.is_vertex {
+            true => lanes::vertex_place(w, &self.inputs),
+            false => lanes::place(w, &self.inputs),
+        };
         let capacity = self.append.capacity(w)?;
         let known = self.inputs.known;
         w.store_variable(known.lane, place.lane)?;
         w.store_variable(known.packed, place.packed)?;
         w.store_variable(known.capacity, capacity)?;
-        self.never_discard(w, capacity)?;
+        if !self.inputs.is_vertex {
+            self.never_discard(w, capacity)?;
+        }
         w.end()?;
         Ok(function)
     }
@@ -170,7 +175,11 @@ impl Functions {
             return Err(NO_PARAMETERS);
         };
         let lanes = Lanes::new(w, &self.inputs);
-        let mut words = header(w, &self.inputs, group, lanes.own, buffer::FRAGMENT).to_vec();
+        let kind = match self.inputs.is_vertex {
+            true => buffer::FRAGMENT | buffer::VERTEX,
+            false => buffer::FRAGMENT,
+        };
+        let mut words = header(w, &self.inputs, group, lanes.own, kind).to_vec();
         let (record, fits) = self.reserve(w, &lanes, buffer::FRAGMENT_UNITS, Each::Lane)?;
         let fits = w.guard(fits)?;
         words.push(element);

@@ -3,6 +3,7 @@
 use super::declare::{Input, Inputs, Types};
 use super::writer::Writer;
 use rspirv::spirv::{Op, Word};
+use spool::buffer::MOST_INSTANCES;
 
 /// Position of a fragment.
 pub(super) struct FragmentPlace {
@@ -15,9 +16,9 @@ pub(super) struct FragmentPlace {
 /// Computes the position of the fragment.
 pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> FragmentPlace {
     let Types { f32, vec4, .. } = w.types;
-    let Input { variable, .. } = inputs.frag_coord;
+    let Input { variable, .. } = inputs.place;
     let at = w.pure(Op::Load, vec4, &[variable]);
-    let [one, thirteen, view_shift] = [1, 13, 26].map(|v| w.constant(v));
+    let [one, thirteen] = [1, 13].map(|v| w.constant(v));
     let pixel = [0, 1].map(|axis| {
         let part = w.extracted(at, axis, f32);
         w.unsigned(Op::ConvertFToU, &[part])
@@ -27,13 +28,30 @@ pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> FragmentPlace {
     let below = w.unsigned(Op::ShiftLeftLogical, &[odd[1], one]);
     let lane = w.unsigned(Op::BitwiseOr, &[odd[0], below]);
     let row = w.unsigned(Op::ShiftLeftLogical, &[quad[1], thirteen]);
-    let mut packed = w.unsigned(Op::BitwiseOr, &[quad[0], row]);
-    if let Some(view) = inputs.view {
-        let view = w.loaded(view);
-        let view = w.unsigned(Op::ShiftLeftLogical, &[view, view_shift]);
-        packed = w.unsigned(Op::BitwiseOr, &[packed, view]);
-    }
+    let packed = w.unsigned(Op::BitwiseOr, &[quad[0], row]);
+    let packed = with_view(w, inputs, packed);
     FragmentPlace { lane, packed }
+}
+
+/// The position of a vertex: lane 0, and its instance and view.
+pub(super) fn vertex_place(w: &mut Writer<'_>, inputs: &Inputs) -> FragmentPlace {
+    let lane = w.constant(0);
+    let most = w.constant(MOST_INSTANCES - 1);
+    let instance = w.loaded(inputs.place);
+    let instance = w.unsigned(Op::BitwiseAnd, &[instance, most]);
+    let packed = with_view(w, inputs, instance);
+    FragmentPlace { lane, packed }
+}
+
+/// A place with the number of the view above it.
+fn with_view(w: &mut Writer<'_>, inputs: &Inputs, place: Word) -> Word {
+    let Some(view) = inputs.view else {
+        return place;
+    };
+    let shift = w.constant(MOST_INSTANCES.trailing_zeros());
+    let view = w.loaded(view);
+    let view = w.unsigned(Op::ShiftLeftLogical, &[view, shift]);
+    w.unsigned(Op::BitwiseOr, &[place, view])
 }
 
 /// The active lanes at a site, and the lane of this fragment.

@@ -1,4 +1,4 @@
-//! Rewrites SPIR-V modules so that their fragment shaders record.
+//! Rewrites SPIR-V modules so that their fragment and vertex shaders record.
 //!
 //! Before instructions that read texels, the rewritten shader calls a function that appends a record to a
 //! buffer: the place of the quad, its draw and primitive, and the coordinates of one or several coordinate
@@ -20,9 +20,9 @@ mod shader;
 mod sites;
 mod writer;
 
-pub use reads::{texel_reads, workgroup_size};
+pub use reads::{ReadCounts, texel_reads, workgroup_size};
 
-use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};
+use rspirv::spirv::{BuiltIn, ExecutionMode, ExecutionModel, Op, StorageClass};
 use shader::Shader;
 use spool::{DepthTests, Site};
 use thiserror::Error;
@@ -63,7 +63,7 @@ pub enum InjectError {
     PushConstants(u32),
 }
 
-/// A recording fragment shader.
+/// A recording fragment or vertex shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rewritten {
     /// The module.
@@ -72,6 +72,8 @@ pub struct Rewritten {
     pub sites: Vec<Site>,
     /// Order of depth test and shading.
     pub tests: DepthTests,
+    /// Instructions of a vertex shader whose reads it does not record.
+    pub unrecorded: ReadCounts,
 }
 
 /// Analyses a fragment shader without rewriting it.
@@ -82,26 +84,30 @@ pub fn depth_tests(words: &[u32], entry: Option<&str>) -> Result<DepthTests, Inj
     Ok(tests_of(&Shader::parse(words, entry)?))
 }
 
-/// Rewrites the fragment shader `entry` of a module, or its only one, so that it records.
+/// Rewrites the shader `entry` of a stage in a module, or its only one, so that it records: all texel reads of a
+/// fragment shader, and those reads of a vertex shader that have an explicit level.
 ///
 /// # Errors
 /// The module cannot be rewritten.
 pub fn instrument(
     words: &[u32],
     entry: Option<&str>,
+    stage: ExecutionModel,
     target: &Target,
 ) -> Result<Rewritten, InjectError> {
-    let shader = Shader::parse(words, entry)?;
-    let tests = tests_of(&shader);
-    let (words, sites) = rewrite::rewrite(shader, tests, target)?;
-    Ok(Rewritten {
-        words,
-        sites,
-        tests,
-    })
+    let shader = Shader::parse_stage(words, entry, stage)?;
+    let target = Target {
+        // Vertices have no quads, so each lane reserves space for itself.
+        ballots: target.ballots && !shader.is_vertex(),
+        ..*target
+    };
+    rewrite::rewrite(shader, &target)
 }
 
 fn tests_of(shader: &Shader) -> DepthTests {
+    if shader.is_vertex() {
+        return DepthTests::Late;
+    }
     if shader.has_mode(ExecutionMode::EarlyFragmentTests) {
         return DepthTests::Early;
     }

@@ -11,6 +11,9 @@ use std::collections::BTreeMap;
 /// Words before the first instruction of a module.
 const HEADER_WORDS: usize = 5;
 
+/// Numbers of instructions that read texels, by kind of texture.
+pub type ReadCounts = BTreeMap<String, u32>;
+
 /// Number of instructions that read texels, by kind of texture, in the shader `entry` of a stage.
 ///
 /// # Errors
@@ -19,26 +22,32 @@ pub fn texel_reads(
     words: &[u32],
     entry: Option<&str>,
     stage: ExecutionModel,
-) -> Result<BTreeMap<String, u32>, InjectError> {
-    let mut counts = BTreeMap::new();
+) -> Result<ReadCounts, InjectError> {
+    let mut counts = ReadCounts::new();
     // Most shaders before the fragment shader read no texels and need no parsing.
     if !opcodes(words).any(reads_texels) {
         return Ok(counts);
     }
     let shader = Shader::parse_stage(words, entry, stage)?;
     for found in shader.instructions().filter_map(|i| find(&shader, i)) {
-        let what = match found.what {
-            What::Texture(of) => match of.shape {
-                Shape::Flat => "two-dimensional textures".to_owned(),
-                Shape::Array => "texture arrays".to_owned(),
-                Shape::Cube => "cube maps".to_owned(),
-            },
-            What::LeftOut(what) => what,
-            What::Coverage | What::Survival => continue,
-        };
-        *counts.entry(what).or_default() += 1;
+        if let Some(what) = kind_of_texture(found.what) {
+            *counts.entry(what).or_default() += 1;
+        }
     }
     Ok(counts)
+}
+
+/// Name of the kind of texture that an instruction reads.
+pub(super) fn kind_of_texture(what: What) -> Option<String> {
+    match what {
+        What::Texture(of) => Some(match of.shape {
+            Shape::Flat => "two-dimensional textures".to_owned(),
+            Shape::Array => "texture arrays".to_owned(),
+            Shape::Cube => "cube maps".to_owned(),
+        }),
+        What::LeftOut(what) => Some(what),
+        What::Coverage | What::Survival => None,
+    }
 }
 
 /// Opcodes of a module's instructions.

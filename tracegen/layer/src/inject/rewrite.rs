@@ -4,19 +4,16 @@ use super::calls::CallEmitter;
 use super::find::Found;
 use super::shader::Shader;
 use super::sites::{Batch, Sites, stays_first};
-use super::{InjectError, Target};
+use super::{InjectError, Rewritten, Target, tests_of};
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{ExecutionMode, Op, Word};
 use spool::DepthTests;
-use spool::{Form, Lod, Site, What};
+use spool::{Form, Lod, What};
 
-/// Rewrites a module. Returns its words and its sites.
-pub(super) fn rewrite(
-    shader: Shader,
-    tests: DepthTests,
-    target: &Target,
-) -> Result<(Vec<u32>, Vec<Site>), InjectError> {
+/// Rewrites a module.
+pub(super) fn rewrite(shader: Shader, target: &Target) -> Result<Rewritten, InjectError> {
+    let tests = tests_of(&shader);
     let mut sites = Sites::new(&shader, tests)?;
     let (functions, main) = (shader.functions.clone(), shader.main);
     let mut calls = CallEmitter::new(&shader, target)?;
@@ -61,7 +58,12 @@ pub(super) fn rewrite(
             calls.builder.module_mut().functions[function].blocks[block].instructions = new;
         }
     }
-    Ok((calls.finish().assemble(), sites.sites))
+    Ok(Rewritten {
+        words: calls.finish().assemble(),
+        sites: sites.sites,
+        tests,
+        unrecorded: sites.unrecorded,
+    })
 }
 
 /// Inserts the recording of coordinate groups before an instruction.

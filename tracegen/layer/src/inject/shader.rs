@@ -214,6 +214,12 @@ impl Shader {
             .flat_map(|block| &block.instructions)
     }
 
+    /// Whether it is a vertex shader.
+    pub fn is_vertex(&self) -> bool {
+        let model = Some(&Operand::ExecutionModel(ExecutionModel::Vertex));
+        self.module.entry_points[self.entry].operands.first() == model
+    }
+
     /// Whether the entry point has an execution mode.
     pub fn has_mode(&self, wanted: ExecutionMode) -> bool {
         self.module.execution_modes.iter().any(|mode| {

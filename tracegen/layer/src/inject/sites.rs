@@ -4,12 +4,13 @@ use super::InjectError;
 use super::find::{Found, find};
 use super::flow::unconditional;
 use super::numbers::{Number, Numbers};
+use super::reads::{ReadCounts, kind_of_texture};
 use super::shader::Shader;
 use rspirv::dr::{Function, Instruction};
 use rspirv::spirv::Op;
 use spool::DepthTests;
 use spool::buffer::MOST_GROUPS;
-use spool::{Form, Site, What};
+use spool::{Form, Lod, Shape, Site, What};
 use std::collections::{HashMap, HashSet};
 
 /// Indices of function, block and instruction.
@@ -35,6 +36,8 @@ pub(super) struct Sites {
     pub entry: Option<u16>,
     /// Group for the end of each fragment.
     pub end: Option<u16>,
+    /// Reads of a vertex shader that are not recorded.
+    pub unrecorded: ReadCounts,
 }
 
 impl Sites {
@@ -44,6 +47,7 @@ impl Sites {
             discards: shader.instructions().any(|i| discards(i.class.opcode)),
             sites: Vec::new(),
             batches: Vec::new(),
+            unrecorded: ReadCounts::new(),
         };
         let mut main = 0;
         for &number in &shader.functions {
@@ -57,6 +61,7 @@ impl Sites {
         let Search {
             sites: open,
             batches,
+            unrecorded,
             ..
         } = search;
         // Groups are numbered batch by batch, so the first number of a batch determines the others.
@@ -74,6 +79,7 @@ impl Sites {
             batches: HashMap::new(),
             entry: None,
             end: None,
+            unrecorded,
         };
         for site in open {
             all.sites.push(Site {
@@ -89,7 +95,8 @@ impl Sites {
         }
         let covers = |site: &Site| site.unconditional && site.form == Form::Quad;
         let discards = tests == DepthTests::EarlyLateWrite;
-        if discards || !all.sites.iter().any(covers) {
+        let is_covered = shader.is_vertex() || all.sites.iter().any(covers);
+        if discards || !is_covered {
             all.entry = Some(all.push(What::Coverage, number(next)?, true));
             next += 1;
         }
@@ -137,6 +144,7 @@ struct Search<'a> {
     discards: bool,
     sites: Vec<OpenSite>,
     batches: Vec<Batch>,
+    unrecorded: ReadCounts,
 }
 
 /// Code that the same lanes execute: the coordinates recorded so far, and the batch that may still grow.
@@ -168,7 +176,8 @@ impl Search<'_> {
                 &mut of_block
             };
             for (place, instruction) in body.instructions.iter().enumerate() {
-                if let Some(found) = find(self.shader, instruction) {
+                let found = find(self.shader, instruction);
+                if let Some(found) = found.and_then(|found| self.recorded(found)) {
                     let coordinate = numbers.of(found.coordinate);
                     let at = (number, block, place);
                     self.add(found, coordinate, is_always && !demoted, at, lanes);
@@ -179,6 +188,27 @@ impl Search<'_> {
                     *lanes = SameLanes::default();
                 }
                 numbers.take(self.shader, instruction);
+            }
+        }
+    }
+
+    /// What is recorded of an image instruction. The reads of a vertex shader without an explicit level, and those of
+    /// other textures than two-dimensional ones and their arrays, are counted instead.
+    fn recorded(&mut self, found: Found) -> Option<Found> {
+        if !self.shader.is_vertex() {
+            return Some(found);
+        }
+        match &found.what {
+            What::Texture(of) if of.shape != Shape::Cube && matches!(of.lod, Lod::Explicit(_)) => {
+                Some(Found {
+                    form: Form::Fragment,
+                    ..found
+                })
+            }
+            _ => {
+                let what = kind_of_texture(found.what)?;
+                *self.unrecorded.entry(what).or_default() += 1;
+                None
             }
         }
     }

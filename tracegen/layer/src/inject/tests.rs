@@ -2,6 +2,7 @@ mod growth;
 
 use super::*;
 use proptest::prelude::*;
+use rspirv::spirv::ExecutionModel::{self, Fragment, GLCompute, Vertex};
 use spool::{Access, Binding, Form, Lod, Shape, TextureSite, What};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -51,6 +52,10 @@ fn module(text: &str) -> Vec<u32> {
 
 /// Rewrites a shader for every target, and validates the results with `spirv-val` if it is installed.
 fn instrumented(words: &[u32]) -> Rewritten {
+    instrumented_entry(words, "main", Fragment)
+}
+
+fn instrumented_entry(words: &[u32], entry: &str, stage: ExecutionModel) -> Rewritten {
     for (ballots, multiview) in [(false, false), (false, true), (true, true)] {
         let target = Target {
             ballots,
@@ -58,12 +63,12 @@ fn instrumented(words: &[u32]) -> Rewritten {
             ..TARGET
         };
         validate(
-            &instrument(words, Some("main"), &target)
+            &instrument(words, Some(entry), stage, &target)
                 .expect("a recording shader")
                 .words,
         );
     }
-    let recording = instrument(words, Some("main"), &TARGET).expect("a recording shader");
+    let recording = instrument(words, Some(entry), stage, &TARGET).expect("a recording shader");
     validate(&recording.words);
     recording
 }
@@ -373,9 +378,10 @@ fn one_entry_point_of_several_is_rewritten() {
         @fragment fn other(in: In) -> @location(0) vec4<f32> {{ discard; }}"
     ));
     assert_eq!(instrumented(&words).tests, DepthTests::Either);
-    let other = instrument(&words, Some("other"), &TARGET).expect("another one");
+    let other = instrument(&words, Some("other"), Fragment, &TARGET).expect("another one");
     assert_eq!(other.tests, DepthTests::EarlyLateWrite);
-    let missing = instrument(&words, Some("vertex"), &TARGET).expect_err("no fragment shader");
+    let missing =
+        instrument(&words, Some("vertex"), Fragment, &TARGET).expect_err("no fragment shader");
     assert_eq!(missing, InjectError::NoFragmentEntry);
 }
 
@@ -402,7 +408,7 @@ fn textures_reached_through_functions_are_found_if_all_calls_agree() {
 #[test]
 fn invalid_spirv_is_refused() {
     for words in [&[][..], &[0x0723_0203], &[1, 2, 3, 4, 5]] {
-        let error = instrument(words, None, &TARGET).expect_err("refused");
+        let error = instrument(words, None, Fragment, &TARGET).expect_err("refused");
         assert!(matches!(error, InjectError::Parse(_)), "{error}");
     }
 }
@@ -434,20 +440,19 @@ proptest! {
                 _ => words[at] ^= 1 << (value % 32),
             }
         }
-        let _ = instrument(&words, None, &TARGET);
+        let _ = instrument(&words, None, Fragment, &TARGET);
     }
 }
 
 #[test]
 fn image_instructions_of_other_stages_are_counted_by_kind_of_texture() {
-    use rspirv::spirv::ExecutionModel::{Fragment, GLCompute, Vertex};
     let words = module(&format!(
         "{HEAD}
         @group(2) @binding(0) var target_: texture_storage_2d<rgba8unorm, write>;
         fn helper(uv: vec2<f32>) -> f32 {{ return textureSampleLevel(color, linear, uv, 0.0).x; }}
         @vertex fn skinned(@builtin(vertex_index) n: u32) -> @builtin(position) vec4<f32> {{
             let a = textureLoad(normals, vec2<u32>(n, 0u), 0);
-            let b = textureLoad(layers, vec2<u32>(n, 0u), 0, 0);
+            let b = textureLoad(layers, vec2<u32>(n, 0u), 0, 0) + textureSampleLevel(sky, linear, a.xyz, 0.0);
             return a + b + textureLoad(volume, vec3<u32>(n), 0) + helper(a.xy);
         }}
         @vertex fn plain(@builtin(vertex_index) n: u32) -> @builtin(position) vec4<f32> {{
@@ -467,10 +472,31 @@ fn image_instructions_of_other_stages_are_counted_by_kind_of_texture() {
     assert_eq!(
         reads("skinned", Vertex),
         [
+            kind("cube maps", 1),
             kind("texture arrays", 1),
             kind("three-dimensional textures", 1),
             kind(flat, 2)
         ]
+    );
+    let recording = instrumented_entry(&words, "skinned", Vertex);
+    let recorded: Vec<_> = (recording.sites.iter().map(|site| (&site.what, site.form)))
+        .map(|(what, form)| match what {
+            What::Texture(of) => (of.shape, of.access, form),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(
+        recorded,
+        [
+            (Shape::Flat, Access::Sample, Form::Fragment),
+            (Shape::Flat, Access::Fetch, Form::Fragment),
+            (Shape::Array, Access::Fetch, Form::Fragment),
+        ]
+    );
+    let counted: Vec<_> = recording.unrecorded.into_iter().collect();
+    assert_eq!(
+        counted,
+        [kind("cube maps", 1), kind("three-dimensional textures", 1)]
     );
     assert!(reads("plain", Vertex).is_empty());
     assert!(reads("main", Fragment).is_empty());

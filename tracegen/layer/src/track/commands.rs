@@ -271,8 +271,14 @@ impl CommandState {
         }
     }
 
-    fn info(&self, draw: u32, call: &Call, textures: Vec<TextureInfo>) -> Option<DrawInfo> {
+    fn info(
+        &self,
+        draw: u32,
+        call: &Call,
+        [textures, vertex_textures]: [Vec<TextureInfo>; 2],
+    ) -> Option<DrawInfo> {
         let pipeline = self.pipeline.as_ref()?;
+        let vertex = pipeline.recorded.as_ref().and_then(|of| of.vertex.as_ref());
         let (state, set) = (&pipeline.state, &self.dynamic);
         let is = |dynamic| state.is_dynamic(dynamic);
         let with_count = vk::DynamicState::VIEWPORT_WITH_COUNT;
@@ -359,7 +365,9 @@ impl CommandState {
             samples: state.samples,
             caveats: [&state.caveats[..], &call.caveats].concat(),
             textures,
-            reads: state.reads.clone(),
+            reads: pipeline.unrecorded_reads(true),
+            vertex_shader: vertex.map(|of| of.shader.shader),
+            vertex_textures,
         })
     }
 }
@@ -406,7 +414,7 @@ impl Commands {
         &mut self,
         buffer: u64,
         call: &Call,
-        textures: Vec<TextureInfo>,
+        textures: [Vec<TextureInfo>; 2],
     ) -> Option<DrawInfo> {
         let number = self.draws;
         let state = self.buffers.get_mut(&buffer)?;

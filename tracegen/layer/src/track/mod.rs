@@ -13,7 +13,9 @@ pub use commands::{Call, CommandState, Commands, Copies, Dynamic, Effects, Execu
 pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
-pub use pipelines::{Compute, Layout, Library, Parts, Pipeline, Pipelines, Recorded, State};
+pub use pipelines::{
+    Compute, Layout, Library, Parts, Pipeline, Pipelines, Recorded, RecordedVertex, State, VERTEX,
+};
 
 use ash::vk::{self, Handle};
 use spool::{DrawInfo, TextureInfo};
@@ -101,12 +103,19 @@ impl Tracker {
         self.commands.draw(command_buffer, call, textures)
     }
 
-    /// Textures that the bound pipeline's shader may read.
-    fn textures(&self, command_buffer: u64) -> Option<Vec<TextureInfo>> {
+    /// Textures that the bound pipeline's fragment shader, and its recording vertex shader, may read.
+    fn textures(&self, command_buffer: u64) -> Option<[Vec<TextureInfo>; 2]> {
         let bound = self.commands.get(command_buffer)?;
         let pipeline = bound.pipeline()?;
+        let vertex = pipeline.recorded.as_ref().and_then(|of| of.vertex.as_ref());
+        let vertex = vertex.map_or(&[][..], |of| &of.bindings);
+        Some([&pipeline.bindings[..], vertex].map(|of| self.textures_of(bound, of)))
+    }
+
+    /// Textures of bindings.
+    fn textures_of(&self, bound: &CommandState, bindings: &[(u32, u32)]) -> Vec<TextureInfo> {
         let mut textures = Vec::new();
-        for &(set, binding) in &pipeline.bindings {
+        for &(set, binding) in bindings {
             let slots = match bound.pushed(set) {
                 Some(pushed) => pushed.binding(binding),
                 None => (bound.set(set)).map_or_else(Vec::new, |set| {
@@ -123,7 +132,7 @@ impl Tracker {
                 sampler: slot.sampler,
             }));
         }
-        Some(textures)
+        textures
     }
 }
 

@@ -6,6 +6,9 @@ use spool::{DepthInfo, ShaderInfo, StageReads};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
+/// Name of the stage whose texture reads are recorded or counted.
+pub const VERTEX: &str = "vertex";
+
 /// Parts of a pipeline (`VK_EXT_graphics_pipeline_library`).
 pub type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
 
@@ -30,6 +33,19 @@ pub struct Recorded {
     pub twice: bool,
     /// Dynamic states of the program's pipeline that it fixes.
     pub fixed: Vec<vk::DynamicState>,
+    /// Its recording vertex shader, if any.
+    pub vertex: Option<RecordedVertex>,
+}
+
+/// A recording vertex shader of a pipeline.
+#[derive(Clone, Debug)]
+pub struct RecordedVertex {
+    /// The shader.
+    pub shader: Arc<ShaderInfo>,
+    /// Set and binding of the textures that it may read.
+    pub bindings: Vec<(u32, u32)>,
+    /// Its texture reads that are not recorded.
+    pub unrecorded: Vec<StageReads>,
 }
 
 /// State of a pipeline that the description of draws needs.
@@ -105,9 +121,11 @@ pub struct Library {
     /// Recording shader of its fragment shader, or the reason why there is none; `None` without a fragment
     /// shader.
     pub shader: Option<Result<Arc<ShaderInfo>, String>>,
-    /// The library with the recording shader.
+    /// Recording shader of its vertex shader, if any.
+    pub vertex: Option<RecordedVertex>,
+    /// The library with the recording shaders.
     pub recording: Option<vk::Pipeline>,
-    /// The library with the recording shader, if it has a fragment shader, and without writes.
+    /// The library with the recording shaders, if it has any, and without writes.
     pub quiet: Option<vk::Pipeline>,
     /// Dynamic states of the library that `quiet` fixes.
     pub fixed: Vec<vk::DynamicState>,
@@ -130,6 +148,18 @@ pub struct Pipeline {
     pub bindings: Vec<(u32, u32)>,
     /// Its state.
     pub state: State,
+}
+
+impl Pipeline {
+    /// Texture reads of the shaders before its fragment shader that are not recorded, while it records or not.
+    pub fn unrecorded_reads(&self, records: bool) -> Vec<StageReads> {
+        let recorded = self.recorded.as_ref().filter(|_| records);
+        let Some(vertex) = recorded.and_then(|of| of.vertex.as_ref()) else {
+            return self.state.reads.clone();
+        };
+        let of_others = self.state.reads.iter().filter(|of| of.stage != VERTEX);
+        of_others.chain(&vertex.unrecorded).cloned().collect()
+    }
 }
 
 /// A compute pipeline whose shader reads textures.

@@ -16,7 +16,7 @@ use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
 use record::{CaptureCounts, DepthReplay, RawRecords, RecordError, Recorder};
 use spool::{Access, DepthTests, RawSample, TextureSite, What};
-use spool::{DrawInfo, ShaderInfo};
+use spool::{DrawInfo, ShaderInfo, TextureInfo};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{Seek, Write};
 
@@ -420,21 +420,21 @@ impl<W: Write + Seek> Builder<W> {
         (coordinates, element): GroupKey,
     ) -> Result<(Group, Vec<UvGroup>), String> {
         Group::new(shader, coordinates, element, |texture| {
-            self.bound(session, info, texture, element)
+            self.bound(session, &info.textures, texture, element)
         })
     }
 
-    /// The texture and sampler that a site reads.
-    fn bound(
+    /// The texture and sampler that a site reads, among the textures of a draw.
+    pub fn bound(
         &mut self,
         session: &Session,
-        info: &DrawInfo,
+        textures: &[TextureInfo],
         site: &TextureSite,
         element: Option<u32>,
     ) -> Result<Bound, String> {
         let find = |binding: &spool::Binding| {
             let wanted = binding.element.or(element).unwrap_or(0);
-            info.textures.iter().find(|texture| {
+            textures.iter().find(|texture| {
                 (texture.set, texture.binding, texture.element)
                     == (binding.set, binding.binding, wanted)
             })
