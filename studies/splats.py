@@ -4,9 +4,9 @@ Installs Chromium and npm from Debian, and the viewers of apps/package-lock.json
 """
 
 import json
-import re
 
 from .apps import found, install
+from .common import Failed
 
 OPTIONS = {"--splats": dict(type=int, default=20000, help="splats of the generated room (20000)")}
 WEBXR = "--iwer node_modules/iwer/build/iwer.min.js --eyes halves"
@@ -16,7 +16,7 @@ VIEWERS = [
     ("gaussian-splats-3d", "@mkkellogg/gaussian-splats-3d", WEBXR),
     ("babylon", "@babylonjs/core", ""),
 ]
-COLUMNS = ("viewer | version | pixels per eye | draws of both eyes | vertices | of them per draw | reads per vertex | vertex reads | fragments | "
+COLUMNS = ("viewer | version | pixels per eye | draws of both eyes | vertices | of them per draw | reads per vertex | vertex reads | lines of the left eye | fragments | "
            "fragments per pixel | draws equal to their query | draws that differ")
 
 
@@ -34,9 +34,10 @@ def run(study):
         equal, different = found(r"occlusion queries: (\d+) draws equal, (\d+) different", said)
         width, height = map(int, found(r"of (\d+)x(\d+) px per eye", said))
         fragments = int(found(r"(\d+) fragments", said)[0])
-        reads = [tuple(map(int, of)) for of in re.findall(r"reads by vertex shaders of .* \((\d+) draws, (\d+) vertices, (\d+) reads", said)]
-        [(draws, vertices)] = {of[:2] for of in reads}
-        each = sum(of[2] for of in reads)
+        if "not in the trace: reads by vertex shaders" in said:
+            raise Failed(f"expected that all vertex reads are recorded, found\n{said}")
+        eyes = study.json("info", trace)["vertex_reads"]
+        draws, vertices, reads = (sum(eye[key] for eye in eyes) for key in ("draws", "vertices", "reads"))
         rows.append([viewer, packages[f"node_modules/{package}"]["version"], f"{width}x{height}", draws, vertices, f"{vertices / draws:.0f}",
-                     f"{each / vertices:.0f}", each, fragments, f"{fragments / (2 * width * height):.1f}", equal, different])
+                     f"{reads / vertices:.1f}", reads, eyes[0]["lines"], fragments, f"{fragments / (2 * width * height):.1f}", equal, different])
     study.write("splats", f"tracegen page --check --frames 30 splats.html; {study.options.splats} splats", COLUMNS, rows)
