@@ -13,6 +13,11 @@ ORDERS = ["z2-lrta", "z2-sta"]
 L2_KIB = [16, 64, 256]
 
 
+def percent(value):
+    """Without a negative zero."""
+    return f"{round(value, 1) + 0:.1f}"
+
+
 def of_scene(study, scene):
     """Bytes and cycles of both eyes in full, by kind of ray, L2, order and sort."""
     trace = study.work / f"{scene}.raytrace"
@@ -46,11 +51,11 @@ def run(study):
                     by_sort[sort] = [100 * (own[0] / none[0] - 1) for own, none in pairs]
                     cycles[sort] = [100 * (own[1] / none[1] - 1) for own, none in pairs if none[1]]
                 rows.append([kind, kib, order, len(scenes), *(
-                    cell for values in by_sort.values() for cell in (f"{mean(values):.1f}", f"{min(values):.1f} to {max(values):.1f}")),
-                    *(f"{mean(values):.1f}" if values else "-" for values in cycles.values())])
+                    cell for values in by_sort.values() for cell in (percent(mean(values)), f"{percent(min(values))} to {percent(max(values))}")),
+                    *(percent(mean(values)) if values else "-" for values in cycles.values())])
                 for scene, more in zip(scenes, zip(*by_sort.values())):
                     base = found[scene][kind, kib, order, "none"][0]
-                    all_scenes.append([scene, kind, kib, order, f"{base / 1e6:.3f}", *(f"{value:.1f}" for value in more)])
+                    all_scenes.append([scene, kind, kib, order, f"{base / 1e6:.3f}", *map(percent, more)])
     detail = f"--size {study.options.size}"
     heads = " | ".join(f"{sort}: more bytes % | {sort}: range" for sort in SORTS[1:])
     study.write("ray-sorts-summary", detail, f"rays | L2 KiB | order | scenes | {heads} | " + " | ".join(f"{sort}: more cycles %" for sort in SORTS[1:]), rows)
