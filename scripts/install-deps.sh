@@ -2,7 +2,7 @@
 # Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
 # install. Always lavapipe (a Vulkan driver that needs no GPU) and a C++ compiler, which the decoder of
 # meshopt needs; with `test` also OSMesa, where there is a package of it (the tests that need it are skipped
-# without), Python for the independent trace readers, hello_xr with an X server for OpenXR, and Slurm for sweeps on a
+# without), Python for the independent trace readers, spirv-val, hello_xr with an X server for OpenXR, and Slurm for sweeps on a
 # cluster; tests are skipped where the last two cannot be had.
 # With `apps` also Chromium, npm and Python, which scripts/apps.sh captures pages with.
 set -eu
@@ -35,6 +35,10 @@ fi
 # OpenGL on Vulkan, for the tests of `tracegen app --gl`.
 if [ "${1:-}" = test ] && ! ls /usr/lib/*/dri/zink_dri.so >/dev/null 2>&1; then
     packages="$packages libegl1 libgl1-mesa-dri"
+fi
+# Validates the shaders that the layer rewrites.
+if [ "${1:-}" = test ] && ! command -v spirv-val >/dev/null 2>&1; then
+    packages="$packages spirv-tools"
 fi
 # Mesa 25.1 dropped it.
 if [ "${1:-}" = test ] && ! ldconfig -p 2>/dev/null | grep -q 'libOSMesa\.so\.8' &&
