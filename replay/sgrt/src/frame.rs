@@ -39,6 +39,11 @@ pub trait RaySource: Sync {
         self.tile(eye, index, tile)
     }
 
+    /// Whether the source has the geometry of rays.
+    fn has_geometry(&self) -> bool {
+        false
+    }
+
     /// The content of the hierarchy, if the source has it and the geometry of rays.
     ///
     /// # Errors
@@ -64,6 +69,10 @@ impl RaySource for Raytrace {
         tile: &mut RayTile,
     ) -> Result<(), TileError> {
         Ok(self.decode_tile_with_geometry(eye, index, tile)?)
+    }
+
+    fn has_geometry(&self) -> bool {
+        Self::has_geometry(self)
     }
 
     fn hierarchy(&self) -> Result<Option<Hierarchy>, TileError> {

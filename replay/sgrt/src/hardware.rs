@@ -210,10 +210,10 @@ pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), F
 /// Whether a sort needs the geometry of rays.
 ///
 /// # Errors
-/// [`FrameError`] for a trace without, and for an unreadable hierarchy.
+/// [`FrameError`] for a trace without.
 pub(super) fn check_sort(source: &dyn RaySource, sort: RaySort) -> Result<bool, FrameError> {
     let needed = sort.row().needs_geometry;
-    if needed && source.hierarchy().map_err(FrameError::Hierarchy)?.is_none() {
+    if needed && !source.has_geometry() {
         return Err(FrameError::NoColumns("tni.ray_sort", sort.name()));
     }
     Ok(needed)

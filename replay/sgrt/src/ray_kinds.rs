@@ -34,6 +34,10 @@ impl RaySource for OfKinds<'_> {
         Ok(())
     }
 
+    fn has_geometry(&self) -> bool {
+        self.source.has_geometry()
+    }
+
     fn hierarchy(&self) -> Result<Option<Hierarchy>, TileError> {
         self.source.hierarchy()
     }
