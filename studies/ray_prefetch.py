@@ -18,6 +18,11 @@ GPU = """cache.node_l1_bytes = 16384, cache.triangle_l1_bytes = 16384, cache.l1_
     cache.l2_ways = 16, cache.l2_latency_cycles = 180, memory.latency_ns = 73, memory.bandwidth_gb_s = 56, tni.units = 8, tni.clock_mhz = 1365,
     tni.trv_pipelines = 4, tni.trv_cycles_per_wide_step = 1, tni.trv_depth_cycles = 4, tni.ist_pipelines = 4, tni.ist_depth_cycles = 8,
     tni.rays_in_flight = 128, cycles.l1_mshrs = 64, cycles.l2_mshrs = 512, cycles.prefetch.visits_dropped = true""".replace("\n", " ")
+# Rays that visit children in the order of the node drop no entries.
+UNDROPPED = GPU.replace(", cycles.prefetch.visits_dropped = true", "")
+WARPS = "cycles.return_group_rays = 32"
+# The machine that is most like that of the papers.
+LIKE_PUBLISHED = "and 4 stack entries"
 # Machines, as the keys that differ from the default, and the tree of rays.
 MACHINES = {
     "default": ("", "bvh2"),
@@ -31,6 +36,9 @@ MACHINES = {
     "dropped entries are visited": ("cycles.prefetch.visits_dropped = true", "bvh2"),
     "eight-wide tree": ("", "cwbvh8"),
     "as Vulkan-Sim": (GPU, "cwbvh8"),
+    "and children in the order of the node": (UNDROPPED, "cwbvh8 --child-order node"),
+    "and warps of 32 rays": (f"{UNDROPPED}, {WARPS}", "cwbvh8 --child-order node"),
+    LIKE_PUBLISHED: (f"{UNDROPPED}, {WARPS}, cycles.prefetch.stack_entries = 4", "cwbvh8 --child-order node"),
     "as Vulkan-Sim, 32 rays, 4 stack entries": (f"{GPU}, cycles.prefetch.stack_entries = 4".replace("in_flight = 128", "in_flight = 32"), "cwbvh8"),
 }
 PUBLISHED = {"treelet": ["1.32", "-", "-"], "ttp": ["1.48", "98.9", "31.5"]}
@@ -80,17 +88,22 @@ def measure(study, trace, kinds, machine=""):
 
 def run(study):
     size, scenes = study.options.size, study.present(SCENES)
-    capture = lambda scene, tree: study.rays(scene, f"--size {size} --all-columns --bounces 1 --bvh {tree}", name=f"{scene}-{tree}")
-    table = []
+    capture = lambda scene, tree: study.rays(scene, f"--size {size} --all-columns --bounces 1 --bvh {tree}", name=f"{scene}-{tree.replace(' ', '')}")
+    table, like = [], []
     machines = {machine: [] for machine in MACHINES}
     with ThreadPoolExecutor(2) as pool:
         for scene in scenes:
-            traces = {tree: capture(scene, tree) for tree in (("bvh2", "cwbvh8") if scene in VARIED else ("bvh2",))}
+            trees = {tree for _, tree in MACHINES.values()} if scene in VARIED else {"bvh2", MACHINES[LIKE_PUBLISHED][1]}
+            traces = {tree: capture(scene, tree) for tree in sorted(trees)}
             found = pool.map(lambda kind: measure(study, traces["bvh2"], KINDS[kind]), KINDS)
             for kind, runs in zip(KINDS, found):
                 table += [[scene, kind, name, prefetcher, *runs[prefetcher].cells(eye)] for eye, name in EYES.items() for prefetcher in PREFETCHERS]
+            names = MACHINES if scene in VARIED else [LIKE_PUBLISHED]
+            of_names = list(pool.map(lambda of: measure(study, traces[of[1]], "", of[0]), [MACHINES[name] for name in names]))
+            cells = {name: runs.cells("reference") for name, runs in of_names[list(names).index(LIKE_PUBLISHED)].items()}
+            like.append([scene, *(cells[name][at] for name in PREFETCHERS for at in (1, 2, -1))])
             if scene in VARIED:
-                for machine, runs in zip(MACHINES, pool.map(lambda of: measure(study, traces[of[1]], "", of[0]), MACHINES.values())):
+                for machine, runs in zip(names, of_names):
                     machines[machine].append(runs)
             study.say(scene)
             study.drop(*traces.values())
@@ -117,3 +130,5 @@ def run(study):
                          f"{mean(run.counted('dropped', 'requested', 'reference') for run in runs):.1f}", f"{idle:.1f}"])
     study.write("ray-prefetch-machines", f"{detail.replace(' --rays KIND', '')} --config FILE", "machine | prefetcher | speed | accuracy % | coverage % | "
                 "more DRAM bytes % | dropped % | idle for lines without prefetcher %", rows, "both eyes, all rays, " + ", ".join(VARIED))
+    study.write("ray-prefetch-like-published", f"{detail.replace(' --rays KIND', '')} --config FILE, --bvh {MACHINES[LIKE_PUBLISHED][1]}",
+                "scene | " + " | ".join(f"{name}: {figure}" for name in PREFETCHERS for figure in ("accuracy %", "coverage %", "speed")), like, "both eyes, all rays")

@@ -210,6 +210,15 @@ pub struct InstanceNodes {
 }
 
 impl BvhSummary {
+    /// The setting of traces whose rays visit children in the order of the node, not the nearest first.
+    pub const NODE_ORDER: (&str, &str) = ("child_order", "node");
+
+    /// Whether rays visit children in the order of the node.
+    pub fn is_in_node_order(&self) -> bool {
+        let mut settings = self.settings.iter();
+        settings.any(|(name, value)| (name.as_str(), value.as_str()) == Self::NODE_ORDER)
+    }
+
     /// Memory of all nodes and triangles in bytes.
     pub fn bytes(&self) -> u64 {
         self.nodes * u64::from(self.bytes_per_node)

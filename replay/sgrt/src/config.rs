@@ -203,9 +203,20 @@ pub struct Cycles {
     /// True if a unit returns its rays in order of dispatch; a finished ray then keeps its slot until all earlier ones
     /// have returned.
     pub in_order_return: bool,
+    /// Rays of a batch that return together: a finished ray keeps its slot until the others of its group have finished.
+    #[serde(default = "single", skip_serializing_if = "is_single")]
+    pub return_group_rays: u32,
     /// What is fetched ahead into the node and triangle caches.
     #[serde(default, skip_serializing_if = "Prefetch::is_none")]
     pub prefetch: Prefetch,
+}
+
+fn single() -> u32 {
+    1
+}
+
+fn is_single(rays: &u32) -> bool {
+    *rays == 1
 }
 
 /// Prefetching into the node and triangle caches.
@@ -347,6 +358,16 @@ impl SgrtConfig {
                 key: "cycles.warp_rays".to_owned(),
                 expected: "1 with a prefetcher, which follows the stacks of single rays",
                 found: self.cycles.warp_rays.to_string(),
+            });
+        }
+        let group = self.cycles.return_group_rays;
+        if group > 1 && (self.cycles.warp_rays > 1 || self.cycles.in_order_return)
+            || group > self.tni.rays_in_flight
+        {
+            return Err(ConfigError::Range {
+                key: "cycles.return_group_rays".to_owned(),
+                expected: "at most tni.rays_in_flight, and 1 with warp_rays or in_order_return",
+                found: group.to_string(),
             });
         }
         let c = &self.cache;

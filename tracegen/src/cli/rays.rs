@@ -7,8 +7,8 @@ use super::light_args::LightArgs;
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use anyhow::{Context, bail};
-use clap::Args;
 use clap::builder::TypedValueParser;
+use clap::{ArgAction, Args};
 use formats::container::AtomicFile;
 use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
@@ -72,6 +72,12 @@ pub struct RaysArgs {
     /// Lay the nodes out in treelets of this size; without it, depth first.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(256..=1 << 20))]
     treelets: Option<u32>,
+    /// Visit a node's children in this order. Implies --visits with `node`, which is slower.
+    #[arg(long, action = ArgAction::Set, value_parser = choice([
+        ("nearest", false, "The nearest child first"),
+        ("node", true, "As the node lists them; boxes are tested only before they go onto the stack"),
+    ]), default_value = "nearest", value_name = "ORDER", conflicts_with = "instances")]
+    child_order: bool,
     /// Build one tree for each mesh that the scene repeats, and one over its instances: same hits, less memory.
     #[arg(long, conflicts_with_all = ["hierarchy", "all_columns"])]
     instances: bool,
@@ -107,13 +113,14 @@ fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
 impl RaysArgs {
     /// Whether every visited node and triangle is recorded.
     fn visits(&self) -> bool {
-        self.visits || self.all_columns
+        self.visits || self.all_columns || self.child_order
     }
 
     fn tree(&self) -> TreeOptions {
         TreeOptions {
             kind: self.bvh,
             treelet_bytes: self.treelets,
+            is_in_node_order: self.child_order,
             instances: self.instances,
         }
     }

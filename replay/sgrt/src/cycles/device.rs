@@ -256,7 +256,7 @@ impl<'m> Device<'m> {
     /// Accepts the next item of a unit with a free slot. Returns true if another one may follow in this cycle.
     fn accept(&mut self, unit: usize, now: u64) -> bool {
         let u = &mut self.units[unit];
-        let Some((batch, item)) = next_item(u, unit, &self.loaded, self.first) else {
+        let Some((batch, item, items)) = next_item(u, unit, &self.loaded, self.first) else {
             return false;
         };
         let ready = u.input.ready();
@@ -265,9 +265,10 @@ impl<'m> Device<'m> {
             return false;
         }
         u.count_until(now, &mut self.counts.cycles);
+        let place = (u.cursor.1, items);
         u.cursor.1 += 1;
         let last = (0..item.rays).fold(now, |_, _| u.input.take(now).start);
-        let slot = u.place(&item, batch, now);
+        let slot = u.place(&item, batch, place, now);
         self.counts.rays_entered += u64::from(item.rays);
         let key = key(phase::UNIT, unit, SLOT, slot);
         self.calendar.push(last + 1, key);
@@ -275,13 +276,13 @@ impl<'m> Device<'m> {
     }
 }
 
-/// The next item of a unit, and the number of its batch.
+/// The next item of a unit, the number of its batch, and the batch's items of the unit.
 fn next_item(
     u: &mut Unit,
     unit: usize,
     loaded: &VecDeque<Loaded>,
     first: u64,
-) -> Option<(u64, Item)> {
+) -> Option<(u64, Item, usize)> {
     if u.cursor.0 < first {
         u.cursor = (first, 0);
     }
@@ -289,7 +290,7 @@ fn next_item(
         let (batch, index) = u.cursor;
         let items = &loaded.get((batch - first) as usize)?.batch.items[unit];
         if let Some(item) = items.get(index) {
-            return Some((batch, *item));
+            return Some((batch, *item, items.len()));
         }
         u.cursor = (batch + 1, 0);
     }

@@ -46,6 +46,8 @@ pub struct Machine {
     pub port_interval: u64,
     /// True if a unit returns its rays in order of dispatch.
     pub in_order_return: bool,
+    /// Rays of a batch that return together; 1 for single rays.
+    pub return_group_rays: usize,
     /// Traversal and intersection pipelines.
     pub pipelines: [Pipelines; 2],
     /// Node and triangle cache of each unit.
@@ -89,6 +91,7 @@ impl Machine {
             warp_rays: cycles.warp_rays,
             port_interval: ticks(1.0 / tni.rays_per_cycle),
             in_order_return: cycles.in_order_return,
+            return_group_rays: cycles.return_group_rays as usize,
             pipelines: [
                 pipelines(tni.trv_pipelines, tni.trv_depth_cycles, step_cycles),
                 pipelines(

@@ -224,6 +224,10 @@ fn rays_return_in_order_of_dispatch_only_if_the_machine_says_so() {
     let ordered = run(&m, &[batch(1, &rays)]);
     assert!(ordered.unit_cycles > any.unit_cycles);
     assert!(ordered.counts.ray_cycles > any.counts.ray_cycles);
+    (m.in_order_return, m.return_group_rays) = (false, 2);
+    let grouped = run(&m, &[batch(1, &rays)]);
+    assert!(grouped.unit_cycles > any.unit_cycles);
+    assert!(grouped.unit_cycles < ordered.unit_cycles);
 }
 
 fn size() -> impl Strategy<Value = CacheSize> {
@@ -254,11 +258,14 @@ fn machines() -> impl Strategy<Value = Machine> {
         1_usize..4,
         1_usize..9,
         1_u64..3 * TICKS,
-        any::<bool>(),
+        prop_oneof![
+            Just((true, 1)),
+            (1_usize..6).prop_map(|group| (false, group))
+        ],
         1_usize..4,
     );
     (shape, [pipelines(), pipelines()], caches).prop_map(|(shape, pipelines, caches)| {
-        let (units, slots, port_interval, in_order_return, tile_buffers) = shape;
+        let (units, slots, port_interval, (in_order_return, group), tile_buffers) = shape;
         let (l1, l2, l2_latency, dram_latency, dram_ticks_per_line) = caches;
         Machine {
             units,
@@ -266,6 +273,7 @@ fn machines() -> impl Strategy<Value = Machine> {
             warp_rays: 1,
             port_interval,
             in_order_return,
+            return_group_rays: group.min(slots),
             pipelines,
             l1,
             l2,

@@ -5,7 +5,7 @@ use super::counts::UnitCycles;
 use super::machine::Machine;
 use formats::view::Eye;
 use sim::memory::Servers;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 
 /// What the ray or warp of a slot does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +29,8 @@ pub struct Slot {
     pub state: State,
     /// Number of its batch.
     pub batch: u64,
+    /// Number of its return group in the batch, and the group's items.
+    pub group: (usize, usize),
     /// Its current request in the batch.
     pub request: u32,
     /// End of its requests.
@@ -63,6 +65,10 @@ pub struct Unit {
     latencies: [u64; 2],
     /// Occupied slots in order of dispatch, if rays return in that order.
     order: Option<VecDeque<usize>>,
+    /// Items that return together.
+    group_items: usize,
+    /// Finished slots of groups that have not returned, by batch and group.
+    groups: HashMap<(u64, usize), Vec<usize>>,
     /// Batch and index of the next item to be accepted.
     pub cursor: (u64, usize),
     occupied: u32,
@@ -88,6 +94,8 @@ impl Unit {
             pipelines: machine.pipelines.map(|p| Servers::new(p.count, p.interval)),
             latencies: machine.pipelines.map(|p| p.latency),
             order: machine.in_order_return.then(VecDeque::new),
+            group_items: machine.return_group_rays,
+            groups: HashMap::new(),
             cursor: (0, 0),
             occupied: 0,
             for_mshr: 0,
@@ -126,8 +134,11 @@ impl Unit {
         *cause += idle;
     }
 
-    /// Puts an item into the lowest free slot. Returns the slot.
-    pub fn place(&mut self, item: &Item, batch: u64, now: u64) -> usize {
+    /// Puts an item into the lowest free slot. `place` is its number in the batch and the number of the batch's items. Returns
+    /// the slot.
+    pub fn place(&mut self, item: &Item, batch: u64, place: (usize, usize), now: u64) -> usize {
+        let group = place.0 / self.group_items;
+        let items = (place.1 - group * self.group_items).min(self.group_items);
         let word = self.free.iter().position(|word| *word != 0);
         let slot = match word {
             Some(word) => 64 * word + self.free[word].trailing_zeros() as usize,
@@ -136,6 +147,7 @@ impl Unit {
         let placed = Slot {
             state: State::Moving,
             batch,
+            group: (group, items),
             request: item.first,
             end: item.end,
             lines_done: 0,
@@ -192,7 +204,14 @@ impl Unit {
     pub fn finish(&mut self, slot: usize, now: u64, mut returns: impl FnMut(usize, u64)) {
         self.set(slot, State::Finished);
         if self.order.is_none() {
-            returns(slot, self.output_cycle(slot, now));
+            let Slot { batch, group, .. } = self.slots[slot];
+            let finished = self.groups.entry((batch, group.0)).or_default();
+            finished.push(slot);
+            if finished.len() == group.1 {
+                for slot in self.groups.remove(&(batch, group.0)).unwrap_or_default() {
+                    returns(slot, self.output_cycle(slot, now));
+                }
+            }
             return;
         }
         while let Some(first) = self.order.as_ref().and_then(|order| order.front().copied())

@@ -10,18 +10,19 @@ const START: Order = Order::Z2_STA;
 const START_REPROJECTED: Order = Order::Z2_LRTA;
 /// The sum of differences above which the other order is rejected, and the one below which it replaces the current one.
 const WORSE: f64 = 0.01;
-const BETTER: f64 = -0.06;
-/// The same for a sum whose last difference has no frame of the current order after it yet.
-const CLEARLY_WORSE: f64 = 0.06;
-const CLEARLY_BETTER: f64 = -0.05;
+const BETTER: f64 = -0.03;
+/// The same as `WORSE` for a sum whose last difference has no frame of the current order after it yet.
+const CLEARLY_WORSE: f64 = 0.03;
 /// Whole frames of the other order in a round. After them, the sign of the sum decides.
 const MOST_TRIALS: u32 = 3;
-/// A whole frame is traced in an order whose sampled pairs fetch at most so much more (logarithm).
+/// A whole frame is traced in a new order whose sampled pairs fetch at most so much more (logarithm). An order that was
+/// compared before needs a sample that fetches no more.
 const LARGEST_RISK: f64 = 0.05;
 /// Least frames between two rounds, and before the first one with `morton`, which loses much where the eyes share much.
-const LEAST_WAIT: usize = 8;
+const LEAST_WAIT: usize = 10;
 const FIRST_MORTON: usize = 14;
-/// Most lines that the trials of an order cost, as a share of the lines until its next trial.
+/// Most lines that a trial costs if it ends with its first frame, as a share of the lines since the last trial of that
+/// order.
 const BUDGET: f64 = 1.0 / 1600.0;
 /// The first frame is compared if it fetches so many times the lines of the L2, because a frame that starts with empty
 /// caches fetches at most the lines of one L2 more.
@@ -36,6 +37,7 @@ pub(super) const ROW: RuleRow = RuleRow {
 /// A round of trials of another order.
 struct Round {
     other: Order,
+    largest_risk: f64,
     /// The frames so far that have the other order, whole or in the sample.
     trials: Vec<usize>,
 }
@@ -43,7 +45,7 @@ struct Round {
 /// The result of a round.
 struct Decided {
     replaces: bool,
-    /// Lines that the trials fetched more, in frames of the current order.
+    /// Lines that the trials fetched more, in frames of the current order. A sample counts like a whole frame.
     cost: f64,
 }
 
@@ -59,6 +61,7 @@ fn choose(frames: &[Counted], setting: &Setting) -> Choice {
     if setting.reprojects {
         due.push((Order::MORTON, FIRST_MORTON));
     }
+    let mut compared: Vec<Order> = Vec::new();
     let (mut current, mut round) = (start, None::<Round>);
     for (at, frame) in frames.iter().enumerate() {
         if is_small(frame) {
@@ -72,7 +75,14 @@ fn choose(frames: &[Counted], setting: &Setting) -> Choice {
                 of_round.trials.push(at);
             }
             if let Some(decided) = decide(&frames[..=at], current, of_round, is_trial) {
-                let wait = LEAST_WAIT.max((decided.cost / BUDGET).ceil() as usize);
+                compared.extend([current, of_round.other]);
+                // The next round starts with a sample, and most rounds end with it.
+                let share = if setting.reprojects {
+                    1.0
+                } else {
+                    Counted::SAMPLE_SHARE
+                };
+                let wait = LEAST_WAIT.max((decided.cost * share / BUDGET).ceil() as usize);
                 for (order, first) in &mut due {
                     let least = if decided.replaces {
                         LEAST_WAIT
@@ -100,6 +110,11 @@ fn choose(frames: &[Counted], setting: &Setting) -> Choice {
                 .min_by_key(|(_, first)| *first)
                 .map(|(other, _)| Round {
                     other: *other,
+                    largest_risk: if compared.contains(other) {
+                        0.0
+                    } else {
+                        LARGEST_RISK
+                    },
                     trials: Vec::new(),
                 });
         }
@@ -128,22 +143,18 @@ fn decide(known: &[Counted], current: Order, round: &Round, is_trial: bool) -> O
     for at in &round.trials {
         let more = difference(known, *at, current);
         if known[*at].choice.sampled.is_some() {
-            is_risky = more > LARGEST_RISK;
-            cost += more.max(0.0) * Counted::SAMPLE_SHARE;
+            is_risky = more > round.largest_risk;
+            cost += more.max(0.0);
         } else {
             sum += more;
             trials += 1;
         }
     }
-    let [worse, better] = if is_trial {
-        [CLEARLY_WORSE, CLEARLY_BETTER]
-    } else {
-        [WORSE, BETTER]
-    };
+    let worse = if is_trial { CLEARLY_WORSE } else { WORSE };
     let replaces = if trials == 0 {
         is_risky.then_some(false)
-    } else if sum > worse || sum < better {
-        Some(sum < better)
+    } else if sum > worse || sum < BETTER {
+        Some(sum < BETTER)
     } else {
         (!is_trial && trials == MOST_TRIALS).then_some(sum < 0.0)
     };
@@ -231,7 +242,7 @@ mod tests {
                     // With both eyes in full, Morton is tried in small frames only.
                     let least = if setting.reprojects { morton } else { lrta };
                     let least = least.min(lrta).min(sta);
-                    // The first frame and the first trials of both other orders have no limit. A better order may take -6 % to be seen.
+                    // The first frame and the first trials of both other orders have no limit. A better order may take -3 % to be seen.
                     let dearest = morton.max(lrta).max(sta);
                     let waits = (FIRST_MORTON + 2 * LEAST_WAIT) as u64;
                     let late = if setting.reprojects {
@@ -239,7 +250,7 @@ mod tests {
                     } else {
                         0
                     };
-                    let start = (3 * (dearest - least) + late) as f64 + 0.06 * least as f64;
+                    let start = (3 * (dearest - least) + late) as f64 + 0.03 * least as f64;
                     let most = least as f64 * (1.0 + 2.0 * BUDGET) + start / FRAMES as f64 + 0.5;
                     assert!(
                         lines <= most,

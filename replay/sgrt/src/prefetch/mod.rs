@@ -70,7 +70,7 @@ pub(super) struct Prefetcher {
     algorithm: Option<Box<dyn RayPrefetcher>>,
     visits_dropped: bool,
     hierarchy: Hierarchy,
-    width: usize,
+    bvh: BvhSummary,
 }
 
 impl Prefetcher {
@@ -96,7 +96,7 @@ impl Prefetcher {
             algorithm: build.map(|build| build(config, bvh, &hierarchy)),
             visits_dropped: config.visits_dropped,
             hierarchy,
-            width: bvh.traversal.width(),
+            bvh: bvh.clone(),
         }))
     }
 
@@ -110,7 +110,7 @@ impl Prefetcher {
     ) {
         let mut ahead = Vec::new();
         let is_ended = ray.kind.ends_at_any_hit() && geometry.hit.is_some();
-        let stacks = Stacks::new(&self.hierarchy, self.width);
+        let stacks = Stacks::new(&self.hierarchy, &self.bvh);
         stacks.for_visits(
             (geometry, is_ended),
             visits,

@@ -1,23 +1,29 @@
 //! The traversal stack of a ray at each of its steps, from its visits, its geometry and the boxes of the hierarchy.
 //!
 //! A visit of a child right after its node means that the ray went down. Its other children whose boxes the ray hits before
-//! the nearest triangle so far went onto the stack, the nearest on top. Any other visit is a pop. Entries above the popped
+//! the nearest triangle so far went onto the stack, the nearest on top (or the first of the node, if rays visit children in
+//! its order). Any other visit is a pop. Entries above the popped
 //! one were dropped, because a nearer triangle had been found since.
 
 use super::Step;
 use crate::detect::intersect;
-use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild, RayGeometry, Visit};
+use formats::raytrace::{BvhSummary, ChildKind, Hierarchy, HierarchyChild, RayGeometry, Visit};
 
 /// The boxes and triangles that rays meet.
 pub(super) struct Stacks<'a> {
     hierarchy: &'a Hierarchy,
     width: usize,
+    is_in_node_order: bool,
 }
 
 impl<'a> Stacks<'a> {
-    /// Of a hierarchy whose nodes have `width` children.
-    pub fn new(hierarchy: &'a Hierarchy, width: usize) -> Self {
-        Self { hierarchy, width }
+    /// Of a trace's hierarchy.
+    pub fn new(hierarchy: &'a Hierarchy, bvh: &BvhSummary) -> Self {
+        Self {
+            hierarchy,
+            width: bvh.traversal.width(),
+            is_in_node_order: bvh.is_in_node_order(),
+        }
     }
 
     /// Calls `each` with each visit of a ray, and with the step that it begins, if it does. With `visits_dropped`, entries that
@@ -112,7 +118,11 @@ impl<'a> Stacks<'a> {
         let others = children().filter(|child| !starts_with(child.kind, next));
         let hit = others.filter_map(|child| Some((entry(ray, child, limit)?, child.kind)));
         let mut hit: Vec<(f32, ChildKind)> = hit.collect();
-        hit.sort_by(|a, b| b.0.total_cmp(&a.0));
+        if self.is_in_node_order {
+            hit.reverse();
+        } else {
+            hit.sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
         stack.extend(hit.into_iter().map(|(_, kind)| kind));
         true
     }

@@ -1,7 +1,7 @@
 use super::treelet::Treelets;
 use super::*;
 use crate::testing::bvh;
-use formats::raytrace::{HierarchyChild, HierarchyTriangle, SlotHit};
+use formats::raytrace::{HierarchyChild, HierarchyTriangle, SlotHit, TraversalKind};
 use proptest::prelude::*;
 
 fn child(kind: ChildKind, z: [f32; 2]) -> Option<HierarchyChild> {
@@ -45,7 +45,7 @@ fn steps(
 ) -> Vec<(usize, u32, Vec<ChildKind>)> {
     let mut found = Vec::new();
     let mut seen = Vec::new();
-    let stacks = Stacks::new(hierarchy, 2);
+    let stacks = Stacks::new(hierarchy, &bvh());
     stacks.for_visits((ray, false), visits, false, |visit, step| {
         found.extend(step.map(|step| (seen.len(), step.pops, step.stack.to_vec())));
         seen.push(visit);
@@ -87,7 +87,7 @@ fn boxes_behind_the_nearest_triangle_so_far_are_not_pushed() {
     assert_eq!(found[3], (3, 2, vec![]));
     let mut all = Vec::new();
     let hierarchy = comb(2);
-    let stacks = Stacks::new(&hierarchy, 2);
+    let stacks = Stacks::new(&hierarchy, &bvh());
     stacks.for_visits((&ray(hit), false), &visits, true, |visit, _| {
         all.push(visit)
     });
@@ -95,6 +95,35 @@ fn boxes_behind_the_nearest_triangle_so_far_are_not_pushed() {
         all,
         [visits[0], visits[1], visits[2], Triangle(2), visits[3]]
     );
+}
+
+#[test]
+fn rays_that_visit_children_in_the_order_of_the_node_push_the_later_ones() {
+    let name_and_value = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
+    let bvh = BvhSummary {
+        settings: vec![name_and_value(BvhSummary::NODE_ORDER)],
+        traversal: TraversalKind::Bvh4,
+        ..bvh()
+    };
+    // A node with three leaves, the first of which is the farthest.
+    let leaf = |slot: u32| child(ChildKind::Leaf(slot, 1), [4.0 - slot as f32; 2]);
+    let hierarchy = Hierarchy {
+        children: vec![leaf(0), leaf(1), leaf(2), None],
+        triangles: vec![HierarchyTriangle::default(); 3],
+    };
+    let stacks = Stacks::new(&hierarchy, &bvh);
+    let visits = [Visit::Node(0), Triangle(0), Triangle(1), Triangle(2)];
+    let mut found = Vec::new();
+    stacks.for_visits((&ray(None), false), &visits, false, |_, step| {
+        found.extend(step.map(|step| (step.pops, step.stack.to_vec())));
+    });
+    let expected = [
+        (0, vec![]),
+        (0, vec![Leaf(2, 1), Leaf(1, 1)]),
+        (1, vec![Leaf(2, 1)]),
+        (2, vec![]),
+    ];
+    assert_eq!(found, expected);
 }
 
 #[test]

@@ -4,6 +4,8 @@ use formats::raytrace::Visit;
 
 /// Receives the work of one ray, in order.
 pub trait Counter {
+    /// Whether it records each visit. Only then can children be visited in the order of the node.
+    const RECORDS: bool = false;
     /// A step at an inner node.
     fn step(&mut self, node: u32);
     /// Tests of `count` triangles, starting at a slot, which is looked up only if it is used.
@@ -67,6 +69,8 @@ pub struct Visits<'a> {
 }
 
 impl Counter for Visits<'_> {
+    const RECORDS: bool = true;
+
     fn step(&mut self, node: u32) {
         self.counts.step(node);
         self.list.push(Visit::Node(node));
@@ -92,6 +96,8 @@ pub struct StackDepth<C> {
 }
 
 impl<C: Counter> Counter for StackDepth<C> {
+    const RECORDS: bool = C::RECORDS;
+
     #[inline(always)]
     fn step(&mut self, node: u32) {
         self.counter.step(node);

@@ -122,6 +122,41 @@ impl Kernel for Scalar {
     }
 }
 
+/// [`Scalar`] for rays that visit children in the order of the node, and test a box before they push it but not when they
+/// pop it: children get their place in the node as entry distance, which is below all limits.
+#[derive(Clone, Copy)]
+pub struct NodeOrder;
+
+impl Kernel for NodeOrder {
+    type Ray<'a> = PreparedRay<'a>;
+
+    fn load<'a>(ray: &PreparedRay<'a>) -> PreparedRay<'a> {
+        *ray
+    }
+
+    fn step2(ray: &PreparedRay<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
+        ([0.0; 2], Scalar::step2(ray, node, t_max).1)
+    }
+
+    fn step8(ray: &PreparedRay<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
+        let mask = Scalar::step8(ray, node, t_max, near);
+        near.0 = std::array::from_fn(|place| f32::from_bits(place as u32));
+        mask
+    }
+
+    fn lines_hit(ray: &PreparedRay<'_>, block: &Block) -> u32 {
+        Scalar::lines_hit(ray, block)
+    }
+
+    fn lines_near(ray: &PreparedRay<'_>, blocks: [&Block; 2], pad: f32) -> u32 {
+        Scalar::lines_near(ray, blocks, pad)
+    }
+
+    fn boxes_hit(ray: &PreparedRay<'_>, block: &Block, t_max: f32, ends: &mut Ends) -> u32 {
+        Scalar::boxes_hit(ray, block, t_max, ends)
+    }
+}
+
 /// The processor's minimum: the second operand if neither is smaller.
 #[inline]
 fn least(a: f32, b: f32) -> f32 {

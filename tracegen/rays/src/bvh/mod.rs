@@ -33,7 +33,7 @@ use formats::raytrace::{BvhSummary, InstanceNodes, TraversalKind};
 use glam::Vec3;
 use instances::Below;
 pub use instances::Placement;
-use kernel::Scalar;
+use kernel::{NodeOrder, Scalar};
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
 pub use on_demand::TreeOptions;
@@ -93,6 +93,7 @@ pub struct Bvh {
     depth8: u32,
     on_demand: OnDemandTree,
     treelet_bytes: Option<u32>,
+    is_in_node_order: bool,
     /// Entries that a traversal stack needs.
     stack_size: usize,
     sah_cost: f64,
@@ -189,6 +190,7 @@ impl Bvh {
             depth8,
             on_demand,
             treelet_bytes: options.treelet_bytes,
+            is_in_node_order: options.is_in_node_order,
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
@@ -282,6 +284,10 @@ impl Bvh {
             .treelet_bytes
             .map(|bytes| ("treelet_bytes".to_owned(), bytes.to_string()));
         settings.extend(treelets);
+        if self.is_in_node_order {
+            let (name, value) = BvhSummary::NODE_ORDER;
+            settings.push((name.to_owned(), value.to_owned()));
+        }
         BvhSummary {
             builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
             settings,
@@ -357,6 +363,10 @@ impl Bvh {
     ) -> Option<RayHit> {
         if self.nodes2.is_empty() || !ray.is_valid() {
             return None;
+        }
+        if C::RECORDS && self.is_in_node_order {
+            debug_assert!(self.below.is_none());
+            return search::<ANY_HIT, NodeOrder, W, C, A>(self, ray, stack, counter, alpha);
         }
         match (self.instructions, &self.below) {
             #[cfg(target_arch = "x86_64")]

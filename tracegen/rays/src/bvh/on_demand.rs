@@ -14,6 +14,8 @@ pub struct TreeOptions {
     pub kind: TraversalKind,
     /// Size of its treelets. Without, nodes are depth first.
     pub treelet_bytes: Option<u32>,
+    /// Whether recorded rays visit children in the order of the node, not the nearest first.
+    pub is_in_node_order: bool,
     /// Whether a scene's repeated meshes are instances of one tree each.
     pub instances: bool,
 }
@@ -31,6 +33,7 @@ impl From<TraversalKind> for TreeOptions {
         Self {
             kind,
             treelet_bytes: None,
+            is_in_node_order: false,
             instances: false,
         }
     }

@@ -3,6 +3,7 @@
 
 use super::reference_walk::ReferenceWalk;
 use super::{SIZE_PX, scene, settings, trace};
+use crate::bvh::TreeOptions;
 use crate::ray::Ray;
 use crate::scene::TraceScene;
 use formats::raytrace::{
@@ -20,9 +21,9 @@ struct Stored {
 }
 
 /// All rays of a trace, and its hierarchy.
-fn columns(traversal: TraversalKind) -> (Vec<Stored>, Hierarchy) {
-    let scene = TraceScene::with_tree(scene(), traversal.into()).expect("small");
-    let (_, bytes) = trace(&scene, settings(traversal), SIZE_PX);
+fn columns(options: TreeOptions) -> (Vec<Stored>, Hierarchy) {
+    let scene = TraceScene::with_tree(scene(), options).expect("small");
+    let (_, bytes) = trace(&scene, settings(options.kind), SIZE_PX);
     let trace = Raytrace::from_bytes(bytes).expect("opens");
     let (hierarchy, _) = trace.read_hierarchy().expect("reads").expect("is there");
     let (mut rays, mut tile) = (Vec::new(), RayTile::default());
@@ -72,7 +73,7 @@ const NEAR_M: f64 = 1e-5;
 
 #[test]
 fn brute_force_over_the_stored_triangles_finds_every_stored_hit() {
-    let (rays, hierarchy) = columns(TraversalKind::Bvh2);
+    let (rays, hierarchy) = columns(TraversalKind::Bvh2.into());
     let (mut hits, mut misses, mut at_edges) = (0u32, 0u32, 0u32);
     for Stored {
         record, geometry, ..
@@ -115,7 +116,7 @@ fn brute_force_over_the_stored_triangles_finds_every_stored_hit() {
     assert!(at_edges < hits / 100, "{at_edges} at edges");
 }
 
-/// Walks the stored binary tree. The distance of the hit triangle is the stored one, because FORMAT.md does not
+/// Walks the stored tree. The distance of the hit triangle is the stored one, because FORMAT.md does not
 /// define the rounding of others; `None` if the order depends on another triangle's distance.
 fn walk(
     ray: &Stored,
@@ -146,7 +147,7 @@ fn walk(
                 visits.push(Visit::Node(node));
                 let mut hit = boxes.hit_children(&line, &axes, node, limit).into_iter();
                 next = hit.next().map(|(_, kind)| kind);
-                stack.extend(hit);
+                stack.extend(hit.rev());
                 deepest = deepest.max(stack.len() as u32);
             }
             ChildKind::Leaf(first, count) => {
@@ -172,9 +173,21 @@ fn walk(
 }
 
 #[test]
-fn a_walk_of_the_stored_binary_tree_makes_the_stored_visits() {
-    let (rays, hierarchy) = columns(TraversalKind::Bvh2);
-    let boxes = ReferenceWalk::new(&hierarchy, 2);
+fn a_walk_of_the_stored_tree_makes_the_stored_visits() {
+    for kind in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
+        for is_in_node_order in [false, true] {
+            walks_make_the_stored_visits(TreeOptions {
+                is_in_node_order,
+                ..kind.into()
+            });
+        }
+    }
+}
+
+fn walks_make_the_stored_visits(options: TreeOptions) {
+    let (rays, hierarchy) = columns(options);
+    let mut boxes = ReferenceWalk::new(&hierarchy, options.kind.width());
+    boxes.is_in_node_order = options.is_in_node_order;
     let mut walked = [0u32; 4];
     for ray in &rays {
         let Some((visits, deepest)) = walk(ray, &hierarchy, &boxes) else {
@@ -191,7 +204,7 @@ fn a_walk_of_the_stored_binary_tree_makes_the_stored_visits() {
 
 #[test]
 fn the_lines_of_rays_follow_from_their_parents_and_lights() {
-    let (rays, _) = columns(TraversalKind::Bvh8);
+    let (rays, _) = columns(TraversalKind::Bvh8.into());
     let mut primary: Option<&Stored> = None;
     let mut shadows = [0u32; 2];
     for ray in &rays {

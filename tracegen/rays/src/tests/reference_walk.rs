@@ -22,6 +22,8 @@ pub struct ReferenceWalk<'a> {
     /// Children of a node.
     width: usize,
     bounds: (Vec3, Vec3),
+    /// Children come in the order of the node, and boxes are not compared again when they are popped.
+    pub is_in_node_order: bool,
 }
 
 impl<'a> ReferenceWalk<'a> {
@@ -36,6 +38,7 @@ impl<'a> ReferenceWalk<'a> {
             hierarchy,
             width,
             bounds,
+            is_in_node_order: false,
         }
     }
 
@@ -127,6 +130,9 @@ impl<'a> ReferenceWalk<'a> {
             .flatten()
             .filter_map(|child| Some((entry(ray, axes, child, limit)?, child.kind)))
             .collect();
+        if self.is_in_node_order {
+            return hit.into_iter().map(|(_, kind)| (0.0, kind)).collect();
+        }
         // Two that are entered at the same distance stay in order. Of more, nodes come before
         // leaves, nodes by their numbers, leaves by their count and slot.
         let more = hit.len() > 2;

@@ -100,6 +100,7 @@ enum Doing {
 struct TwinSlot {
     doing: Doing,
     batch: usize,
+    index: usize,
     item: Item,
     request: u32,
     line: u32,
@@ -115,6 +116,7 @@ struct TwinUnit {
     input: u64,
     output: u64,
     order: VecDeque<usize>,
+    finished: Vec<usize>,
     leaving: VecDeque<usize>,
     next: (usize, usize),
 }
@@ -148,6 +150,7 @@ pub fn twin(machine: &Machine, batches: &[Batch]) -> Simulated {
         input: 0,
         output: 0,
         order: VecDeque::new(),
+        finished: Vec::new(),
         leaving: VecDeque::new(),
         next: (0, 0),
     };
@@ -309,8 +312,7 @@ impl Twin<'_> {
         if s.request == s.item.end {
             s.doing = Doing::Finished;
             if !self.machine.in_order_return {
-                s.doing = Doing::Leaving(s.item.rays);
-                self.units[unit].leaving.push_back(slot);
+                self.leave_together(unit, slot);
             }
             return;
         }
@@ -323,6 +325,27 @@ impl Twin<'_> {
             for line in of.first_line..of.first_line + of.lines {
                 self.prefetch(2 * unit + of.pipeline as usize, line, eye, now);
             }
+        }
+    }
+
+    /// The items of a slot's group leave in the order in which they have finished, once all have.
+    fn leave_together(&mut self, unit: usize, slot: usize) {
+        let most = self.machine.return_group_rays;
+        let u = &mut self.units[unit];
+        u.finished.push(slot);
+        let group = |of: &TwinSlot| (of.batch, of.index / most);
+        let of = u.slots[slot].as_ref().map(group).expect("a ray");
+        let is_of_group = |slot: &usize| u.slots[*slot].as_ref().map(group) == Some(of);
+        let (mates, others): (Vec<_>, _) = u.finished.iter().partition(|slot| is_of_group(slot));
+        let items = self.batches[of.0].items[unit].len();
+        if mates.len() < most.min(items - of.1 * most) {
+            return;
+        }
+        u.finished = others;
+        for slot in mates {
+            let s = u.slots[slot].as_mut().expect("a ray");
+            s.doing = Doing::Leaving(s.item.rays);
+            u.leaving.push_back(slot);
         }
     }
 
@@ -533,6 +556,7 @@ impl Twin<'_> {
             u.slots[slot] = Some(TwinSlot {
                 doing: Doing::Entering(last + 1),
                 batch: u.next.0,
+                index: u.next.1,
                 item,
                 request: item.first,
                 line: 0,
