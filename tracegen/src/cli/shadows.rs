@@ -72,12 +72,12 @@ pub fn run(args: &ShadowsArgs) -> anyhow::Result<()> {
         .map(|(name, format, _)| Ok((*name, *format, draw(*format, true)?)))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let mut eyes = Vec::new();
-    for eye in 0..lit.len() {
+    for (eye, lit) in lit.iter().enumerate() {
         let (size_px, fov) = (world.hmd.eye_size_px, &world.hmd.fov[eye]);
         let mask = Mask::of_lens(size_px, fov, &world.lens[eye]);
         let ppd = image_error::pixels_per_degree(size_px[0], fov);
         let exact = drawn[0].2[eye].clone();
-        let shadow = differing(&exact, &lit[eye]);
+        let shadow = differing(&exact, lit);
         eyes.push((
             Reference::new(exact, mask, ppd).context("comparing pictures")?,
             shadow,
