@@ -11,7 +11,7 @@ from difflib import SequenceMatcher
 from .common import Absent, Failed, Study, read_table
 
 # Those whose figures are the same on every machine with the same Mesa. All of them take hours.
-STUDIES = ["backends", "constants", "dram", "levels", "organisations", "paper", "policies", "prefetch", "ray-orders", "ray-sorts", "ray-trees", "sgrt", "shadow-orders", "temporal", "whole-frame"]
+STUDIES = ["backends", "constants", "dram", "levels", "organisations", "paper", "policies", "prefetch", "ray-orders", "ray-sorts", "ray-trees", "sgrt", "shadow-formats", "shadow-orders", "temporal", "whole-frame"]
 OPTIONS = {
     "studies": dict(nargs="*", metavar="STUDY", help=f"some of: {', '.join(STUDIES)} (all)"),
     "--tolerance": dict(type=float, default=0.001, help="relative difference that counts as equal (0.001)"),

@@ -1,7 +1,9 @@
 //! Tests of `tracegen raster`: counts in its summary, passes of moving scenes, skipped geometry, and
 //! refusals.
 
-use parallax_tests::{program, run_ok, said};
+use formats::textrace::{Textrace, Tile};
+use formats::texture::TexelFormat;
+use parallax_tests::{program, refuse, run_ok, said};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -51,6 +53,72 @@ fn each_stage_counts_its_own_draws() {
         "{with_plain}"
     );
     assert_eq!(draws(&without, "plain render"), None, "{without}");
+}
+
+#[test]
+fn smaller_shadow_maps_only_take_shadow_away_and_stand_in_the_trace() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let capture = |name: &str| {
+        let [trace, picture] =
+            ["textrace", "png"].map(|ending| folder.path().join(name).with_extension(ending));
+        let options = [
+            "atrium-shadows",
+            "--size",
+            "160x128",
+            "--shadow-format",
+            name,
+            "--shade",
+        ];
+        run_ok(raster(&options, &trace).arg("--image").arg(&picture));
+        let read = Textrace::open(&trace).expect("a trace");
+        let mut textures = read.tables().textures.clone();
+        let maps = textures.pop().expect("shadow maps");
+        let picture = image::open(picture)
+            .expect("a picture")
+            .into_rgb8()
+            .into_raw();
+        let verify = ["verify", "atrium-shadows", "--tiles", "2", "--trace"];
+        run_ok(program("tracegen").args(verify).arg(&trace));
+        let decoded = |(pass, number)| {
+            let mut tile = Tile::default();
+            read.decode_tile(pass, number, &mut tile).expect("a tile");
+            tile
+        };
+        let of_pass = |pass: usize| (0..20).map(move |number| (pass, number));
+        let tiles: Vec<Tile> = (0..2).flat_map(of_pass).map(decoded).collect();
+        (maps.format, picture, textures, tiles)
+    };
+    let (format, exact, textures, tiles) = capture("r32f");
+    assert_eq!(format, TexelFormat::R32f);
+    for (name, expected) in [("d16", TexelFormat::D16), ("bc4", TexelFormat::Bc4)] {
+        let (format, picture, others, same_tiles) = capture(name);
+        assert_eq!(format, expected);
+        assert!(others == textures && same_tiles == tiles, "{name}");
+        assert!(
+            picture
+                .iter()
+                .zip(&exact)
+                .all(|(found, exact)| found >= exact),
+            "{name}"
+        );
+        assert!(name == "d16" || picture != exact);
+    }
+}
+
+#[test]
+fn smaller_shadow_maps_are_refused_where_there_are_none() {
+    let never = Path::new("never.textrace");
+    let maps = "a scene with shadow maps";
+    let bc4 = ["teapot", "--size", "32x32", "--shadow-format", "bc4"];
+    refuse(&mut raster(&bc4, never), &["teapot", maps, "--shadows"]);
+    refuse(
+        program("tracegen").args(["shadows", "teapot"]),
+        &["teapot", maps, "--shadows"],
+    );
+    for (other, value) in [("--technique", "per-eye"), ("--auto", "pixels=2")] {
+        let options = [&bc4[..], &["--shadows", other, value]].concat();
+        refuse(&mut raster(&options, never), &["--shadow-format", other]);
+    }
 }
 
 #[test]

@@ -126,6 +126,13 @@ fn cascades(scene: &Scene, tables: &Tables, images: usize, faults: &mut Faults) 
     found
 }
 
+/// The format of the shadow maps: that of the trace, if maps can have it.
+fn shadow_format(tables: &Tables, images: usize) -> TexelFormat {
+    let found = tables.textures.get(images).map(|maps| maps.format);
+    let smaller = found.filter(|found| matches!(found, TexelFormat::D16 | TexelFormat::Bc4));
+    smaller.unwrap_or(TexelFormat::R32f)
+}
+
 fn hold_textures(mut expected: Vec<Texture>, cascades: u32, tables: &Tables, faults: &mut Faults) {
     if cascades > 0 {
         expected.push(Texture {
@@ -133,7 +140,7 @@ fn hold_textures(mut expected: Vec<Texture>, cascades: u32, tables: &Tables, fau
             size: [SHADOW_SIZE; 2],
             levels: 1,
             layers: cascades,
-            format: TexelFormat::R32f,
+            format: shadow_format(tables, expected.len()),
             color_space: ColorSpace::Linear,
             part: None,
         });

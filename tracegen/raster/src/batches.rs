@@ -87,6 +87,7 @@ mod tests {
             moving: Vec::new(),
             groups: Vec::new(),
             cascades: 0,
+            shadow_format: formats::texture::TexelFormat::R32f,
             hierarchy: visibility::Hierarchy::default(),
         }
     }

@@ -115,6 +115,8 @@ pub struct DrawList {
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
+    /// Format in which they sample them: R32F, D16 or BC4.
+    pub shadow_format: TexelFormat,
     /// Hierarchy of the draws' bounds.
     pub hierarchy: Hierarchy,
 }
@@ -182,6 +184,7 @@ impl DrawList {
             moving,
             groups: scene.materials.iter().map(MaterialGroups::new).collect(),
             cascades,
+            shadow_format: TexelFormat::R32f,
         })
     }
 
@@ -248,7 +251,7 @@ impl DrawList {
                 size: [SHADOW_SIZE; 2],
                 levels: 1,
                 layers: self.cascades,
-                format: TexelFormat::R32f,
+                format: self.shadow_format,
                 color_space: ColorSpace::Linear,
                 part: None,
             });

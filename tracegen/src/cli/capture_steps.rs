@@ -7,6 +7,7 @@ use crate::study::world::World;
 use anyhow::Context;
 use formats::container::AtomicFile;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
+use formats::texture::TexelFormat;
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::Pictures;
 use raster::geometry::geometry;
@@ -18,6 +19,18 @@ use textures::{Cache, TextureSet};
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
+
+/// Formats of shadow maps.
+pub(super) const SHADOW_FORMATS: [(&str, TexelFormat, &str); 3] = [
+    ("r32f", TexelFormat::R32f, "4 bytes a texel"),
+    ("d16", TexelFormat::D16, "2 bytes a texel"),
+    ("bc4", TexelFormat::Bc4, "8 bytes for 4x4 texels"),
+];
+
+/// The refusal of a scene without shadow maps.
+pub(super) fn no_maps(scene: &str) -> String {
+    format!("{scene}: expected a scene with shadow maps, found one without: add --shadows")
+}
 
 /// Loads the scene and the path of `tracegen raster`.
 pub fn load(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<SceneSetup> {

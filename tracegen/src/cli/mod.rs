@@ -36,6 +36,7 @@ mod raster_summary;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+pub mod shadows;
 #[cfg(feature = "lab")]
 pub mod stress;
 pub mod sweep;
@@ -93,6 +94,8 @@ enum Command {
     Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
+    /// Measure the error of shadow maps in smaller formats: pictures, and distances from shadows' edges.
+    Shadows(Box<shadows::ShadowsArgs>),
     /// Capture every combination of a manifest's scenes, cameras and displays; an interrupted sweep resumes.
     Sweep(sweep::SweepArgs),
     /// Compare a captured frame with a reference in double precision: coverage, coordinates, levels, colours.
@@ -126,6 +129,7 @@ pub fn main() -> ExitCode {
                 Command::Xr(args) => return xr::run(&args),
                 Command::Page(args) => return page::run(&args),
                 Command::Techniques(args) => techniques::run(&args)?,
+                Command::Shadows(args) => shadows::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
                 Command::Verify(args) => return verify::run(&args),
                 Command::Rays(args) => rays::run(&args)?,

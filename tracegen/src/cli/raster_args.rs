@@ -1,6 +1,7 @@
 //! Arguments of `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::SHADOW_FORMATS;
 use super::choice::choice;
 use super::drivers::Driver;
 use super::frames_arg::{Chosen, Frames};
@@ -14,6 +15,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use formats::textrace::Encoding;
+use formats::texture::TexelFormat;
 use formats::view::Eye;
 use raster::backend::Fragments;
 use shell::Threads;
@@ -52,6 +54,11 @@ pub struct RasterArgs {
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     pub(super) shadows: bool,
+    /// Format of the shadow maps that draws sample and the trace names. Smaller formats are made of finished
+    /// maps, with depths rounded away from the light.
+    #[arg(long, value_parser = choice(SHADOW_FORMATS), default_value = "r32f", value_name = "FORMAT",
+          conflicts_with_all = ["auto", "technique", "plan_only"])]
+    pub(super) shadow_format: TexelFormat,
     /// Views of each frame.
     #[arg(long, value_parser = views_parser(), default_value = "stereo", help_heading = "Camera")]
     pub(super) views: &'static [Eye],
@@ -208,6 +215,7 @@ impl RasterArgs {
         let named = self.technique.as_ref().map(|_| "--technique");
         if let Some(flag) = auto
             .or(named)
+            .or((self.shadow_format != TexelFormat::R32f).then_some("--shadow-format"))
             .or_else(|| self.techniques.beyond_plain_frames())
         {
             bail!(

@@ -1,7 +1,7 @@
 //! `tracegen raster` with the techniques of its options: plans, prepares, captures, compares and prints.
 
 use super::capture_steps::{
-    TraceOutput, cascades, load, prepare_textures, tables, warn_of_multiview_defect,
+    TraceOutput, cascades, load, no_maps, prepare_textures, tables, warn_of_multiview_defect,
 };
 use super::drivers::Opened;
 use super::prepared::world;
@@ -11,6 +11,7 @@ use super::scene_args::SceneSetup;
 use crate::study::processor;
 use crate::study::world::World;
 use anyhow::ensure;
+use formats::texture::TexelFormat;
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, CapturedFrame, Pictures};
 use raster::frame::Frame;
@@ -124,7 +125,12 @@ impl<'a> Session<'a> {
         }
         let lens = args.techniques.lens.lenses(&setup.hmd)?;
         let cascades = cascades(&setup.scene, args.shadows);
-        let world = world(setup, cascades, lens)?;
+        ensure!(
+            cascades > 0 || args.shadow_format == TexelFormat::R32f,
+            no_maps(&args.scene.scene)
+        );
+        let mut world = world(setup, cascades, lens)?;
+        world.draws.shadow_format = args.shadow_format;
         let settings = args.techniques.settings(&world.hmd)?;
         let planner = Planner::new(&settings, &world.hmd, world.lens, args.views, args.path.fps)?;
         Ok(Self {

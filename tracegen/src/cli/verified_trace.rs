@@ -3,7 +3,6 @@
 use super::scene_args::SceneSetup;
 use anyhow::{Context, bail, ensure};
 use formats::textrace::Textrace;
-use formats::texture::TexelFormat;
 use formats::view::FrameViews;
 use glam::DVec3;
 use scene::{Camera, Scene};
@@ -100,7 +99,7 @@ fn camera_of(views: &FrameViews, scene: &Scene, own: &Camera) -> Camera {
 /// Shadow cascades of a trace.
 pub(super) fn trace_cascades(trace: &Textrace) -> u32 {
     let last = trace.tables().textures.last();
-    let maps = last.filter(|t| t.format == TexelFormat::R32f && t.name == SHADOW_MAPS);
+    let maps = last.filter(|t| t.name == SHADOW_MAPS);
     maps.map_or(0, |maps| maps.layers.min(MOST_CASCADES))
 }
 

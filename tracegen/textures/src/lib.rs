@@ -14,6 +14,7 @@
 //! The encoder is texpresso's range fit with fixed weights (perceptual for colour, uniform for
 //! data). It works block by block, so the bytes do not depend on the number of threads.
 
+pub mod bc4;
 mod cache;
 mod compress;
 mod mipmap;

@@ -10,6 +10,7 @@ mod multiview;
 mod pipelines;
 mod readback;
 mod records;
+mod shadow_maps;
 mod starts;
 mod targets;
 mod texels;
@@ -27,16 +28,18 @@ use super::shader::{AlphaSource, Granularity, VIEW_BINDINGS};
 use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
+use formats::texture::TexelFormat;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use readback::Readback;
 use record::{Captured, DEPTH_BYTES, MergedQuads, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
 use scene::Scene;
+use shadow_maps::ShadowMaps;
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
-use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps, depth_attachment};
+use targets::{ColorTarget, LayerMask, LayerTarget, depth_attachment};
 use techniques::Start;
 use techniques::plan::PictureSource;
 use techniques::start::Opening;
@@ -100,7 +103,7 @@ impl Lavapipe {
         targets::check_size(&gpu, view_size_px)?;
         let record_buffers = RecordBuffers::new(&gpu, record_budget_bytes, masked)?;
         let shadow_maps = gpu.checked("making the shadow maps", || {
-            ShadowMaps::new(&gpu, draws.cascades)
+            ShadowMaps::new(&gpu, draws.cascades, draws.shadow_format)
         })?;
         let eye_bindings = bind_view(
             &gpu,
@@ -378,7 +381,7 @@ impl CaptureBackend for Lavapipe {
             return Ok(());
         }
         // The map cannot be bound while it is rendered, so a placeholder is bound for the casters.
-        let stand_in = ShadowMaps::new(&self.gpu, 0);
+        let stand_in = ShadowMaps::new(&self.gpu, 0, TexelFormat::R32f);
         for (number, (cascade, visible)) in lighting.cascades.iter().zip(&frame.casters).enumerate()
         {
             if !frame.cascades_seen[number] {
@@ -411,6 +414,7 @@ impl CaptureBackend for Lavapipe {
                 self.issue(&mut pass, draws, &plan);
             })?;
         }
+        self.shadow_maps.store(&self.gpu, &self.readback)?;
         self.gpu.wait("rendering the shadow cascades")
     }
 

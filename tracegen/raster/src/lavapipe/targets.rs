@@ -1,8 +1,7 @@
-//! Attachments of layers, pictures and shadow maps.
+//! Attachments of layers and pictures.
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
-use crate::draws::SHADOW_SIZE;
 use crate::error::RasterError;
 use record::Region;
 use std::sync::Arc;
@@ -176,46 +175,6 @@ impl ColorTarget {
                 view: texture.create_view(&Default::default()),
             }
         })
-    }
-}
-
-/// The shadow map array: one view to sample, and one per layer to render.
-pub struct ShadowMaps {
-    /// All layers.
-    pub sampled: wgpu::TextureView,
-    /// Each layer.
-    pub layers: Vec<wgpu::TextureView>,
-}
-
-impl ShadowMaps {
-    /// An array of `cascades` layers; without any, a single texel that no pipeline samples.
-    pub fn new(gpu: &Gpu, cascades: u32) -> Self {
-        let size = if cascades == 0 { 1 } else { SHADOW_SIZE };
-        let texture = attachment(
-            gpu,
-            [size; 2],
-            cascades.max(1),
-            1,
-            DEPTH_FORMAT,
-            wgpu::TextureUsages::TEXTURE_BINDING,
-        );
-        let layers = (0..cascades)
-            .map(|layer| {
-                texture.create_view(&wgpu::TextureViewDescriptor {
-                    dimension: Some(wgpu::TextureViewDimension::D2),
-                    base_array_layer: layer,
-                    array_layer_count: Some(1),
-                    ..Default::default()
-                })
-            })
-            .collect();
-        Self {
-            sampled: texture.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            }),
-            layers,
-        }
     }
 }
 
