@@ -16,6 +16,8 @@ pub struct TreeOptions {
     pub treelet_bytes: Option<u32>,
     /// Whether a scene's repeated meshes are instances of one tree each.
     pub instances: bool,
+    /// Whether the tree can be refitted to other positions of its triangles.
+    pub refit: bool,
 }
 
 impl TreeOptions {
@@ -32,6 +34,7 @@ impl From<TraversalKind> for TreeOptions {
             kind,
             treelet_bytes: None,
             instances: false,
+            refit: false,
         }
     }
 }
