@@ -229,6 +229,20 @@ pub struct BvhUpdate {
     pub nodes: u64,
 }
 
+impl std::fmt::Display for BvhUpdate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{}: {} triangles read and {} written, {} instances, {} nodes",
+            name_of(&self.method),
+            self.triangles_read,
+            self.triangles_written,
+            self.instances,
+            self.nodes
+        )
+    }
+}
+
 /// The nodes that are instances of a tree with two levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InstanceNodes {

@@ -34,11 +34,11 @@ impl Pose {
 #[derive(Debug)]
 pub struct Moved {
     pub(crate) objects: Objects,
-    mesh_of: Vec<usize>,
+    pub(crate) mesh_of: Vec<usize>,
     /// By object, whether its transform changed.
     pub(crate) placed: Vec<bool>,
     /// By mesh, whether a vertex of each triangle moved; empty if none did.
-    triangles: Vec<Vec<bool>>,
+    pub(crate) triangles: Vec<Vec<bool>>,
 }
 
 impl Moved {

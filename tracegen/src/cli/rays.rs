@@ -355,16 +355,7 @@ fn result(tables: &RaytraceTables, frame: &RayFrame) -> String {
         .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
     let instances = bvh.instances.map(|of| format!("{} instances, ", of.count));
-    let update = bvh.update.map(|of| {
-        format!(
-            "\nupdate: {}, {} triangles read and {} written, {} instances, {} nodes",
-            name_of(&of.method),
-            of.triangles_read,
-            of.triangles_written,
-            of.instances,
-            of.nodes
-        )
-    });
+    let update = bvh.update.map(|of| format!("\nupdate by {of}"));
     format!(
         "hierarchy: {}, {}{} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}\n\
          rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray{}",

@@ -344,3 +344,6 @@ impl Objects {
         (object, primitive - self.first[object])
     }
 }
+
+#[cfg(test)]
+mod tests;
