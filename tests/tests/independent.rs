@@ -308,7 +308,7 @@ fn python_reads_updates_of_the_hierarchy_as_replay_does() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("moving.raytrace");
-    for more in [&["refit"][..], &["rebuild"], &["refit", "--instances"]] {
+    for more in [&["rebuild"][..], &["refit", "--instances"]] {
         let options = [
             "--size",
             "40x24",
@@ -317,7 +317,7 @@ fn python_reads_updates_of_the_hierarchy_as_replay_does() {
             "9",
             "--bvh-update",
         ];
-        rays("plant:200", &[&options[..], more].concat(), &path);
+        rays("plant", &[&options[..], more].concat(), &path);
         assert_eq!(check(&path), 2 * 40 * 24);
         run_ok(program("replay").arg("validate").arg(&path));
     }

@@ -174,9 +174,10 @@ mod tests {
     /// The sums of the tables of passes in docs/models/ray-tracing.md.
     #[test]
     fn a_rebuild_is_the_sum_of_its_passes() {
-        let (input, output) = (5 * 40 + 2 * (64 + 64), 3 * 40 + 2 * 64 + 7 * 64);
+        let input: u64 = 5 * 40 + 2 * (64 + 64);
+        let output: u64 = 3 * 40 + 2 * 64 + 7 * 64;
         let found = update(UpdateMethod::Rebuild);
-        let bytes = |inputs, read, written| UpdateBytes {
+        let bytes = |inputs: u64, read: u64, written: u64| UpdateBytes {
             read_bytes: inputs * input + 7 * read,
             written_bytes: output + 7 * written,
         };

@@ -197,23 +197,23 @@ fn instances_follow_their_matrices_and_trees_that_do_not_move_are_kept() {
             ..options(kind, None)
         };
         let meshes = |first: &Vec<Triangle>| [first.clone(), small.clone(), rest.clone()];
-        let built = |first, turn| {
+        let built = |first, turn, origin| {
             let (meshes, placements) = (meshes(first), placements(turn));
-            Bvh::build_instanced(options, DVec3::ZERO, &meshes, &placements, |_| false)
+            Bvh::build_instanced(options, origin, &meshes, &placements, |_| false).expect("small")
         };
         let origin = DVec3::new(0.5, -0.25, 2.0);
-        let mut refitted = built(&mesh, 0.0).expect("small");
+        let mut refitted = built(&mesh, 0.0, DVec3::ZERO);
         (refitted.refit_instanced(origin, &meshes(first), &placements(0.7))).expect("invertible");
-        let flat: Vec<Triangle> = (placements(0.7).iter())
-            .flat_map(|at| {
-                meshes(first)[at.mesh]
-                    .clone()
-                    .into_iter()
-                    .map(|t| at.triangle(origin, t))
-            })
-            .collect();
-        let flat_tree = Bvh::build_for(options, &flat, |_| false).expect("small");
-        let hits = assert_equal_hits(kind, [&refitted, &flat_tree], &rays(&flat, 2000));
+        let at = |p: &Placement| {
+            meshes(first)[p.mesh]
+                .clone()
+                .into_iter()
+                .map(|t| p.triangle(origin, t))
+                .collect()
+        };
+        let all: Vec<Vec<Triangle>> = placements(0.7).iter().map(at).collect();
+        let rebuilt = built(first, 0.7, origin);
+        let hits = assert_equal_hits(kind, [&refitted, &rebuilt], &rays(&all.concat(), 2000));
         assert!(hits > 500, "{hits}");
 
         let is_bent = first == &bent;
