@@ -308,7 +308,7 @@ fn a_refitted_tree_has_the_hits_of_a_rebuilt_one() {
                 hits.push(format!("{:?}", tile.pixels));
             }
         }
-        let pixels = fs::read(&picture).expect("a picture");
+        let pixels = fs::read(picture).expect("a picture");
         (
             hits,
             pixels,

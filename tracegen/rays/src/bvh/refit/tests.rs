@@ -75,9 +75,12 @@ fn below(tree: &Hierarchy, width: usize, child: usize, out: &mut Vec<u32>) {
     let by_primitive = |p: &u32| tree.triangles.iter().find(|t| t.primitive == *p);
     for triangle in out[own..].iter().filter_map(by_primitive) {
         for point in triangle.vertices {
-            for axis in 0..3 {
-                assert!(child.min[axis] <= point[axis] && point[axis] <= child.max[axis]);
-            }
+            let ends = child.min.iter().zip(&child.max);
+            assert!(
+                { ends }
+                    .zip(point)
+                    .all(|((min, max), at)| *min <= at && at <= *max)
+            );
         }
     }
 }
