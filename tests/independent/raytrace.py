@@ -54,6 +54,13 @@ HIERARCHY = {
     "bytes_per_node": "u32",
     "bytes_per_triangle": "u32",
 }
+UPDATE = {
+    "method": "string",
+    "triangles_read": "u64",
+    "triangles_written": "u64",
+    "instances": "u64",
+    "nodes": "u64",
+}
 MATERIAL = {
     "name": "string",
     "diffuse": "bool",
@@ -345,6 +352,14 @@ def read_tile(data, pixels, eye, meta, bvh, triangles):
     return out, len(rays)
 
 
+def check_update(update, bvh):
+    instances = bvh.get("instances", {"count": 0})["count"]
+    require(update["method"] in ("rebuild", "refit"), "method of the update")
+    require(update["triangles_written"] <= update["triangles_read"] <= bvh["triangles"], "triangles of the update")
+    require(update["instances"] <= instances, "instances of the update")
+    require(update["nodes"] <= bvh["nodes"] - instances, "nodes of the update")
+
+
 def geometry_entries(chunks, version, tiles):
     """Spans of the tiles' geometry, or None."""
     tags = {"RGEO", "RGIX"} & set(chunks)
@@ -375,12 +390,16 @@ def main(path, what=None):
     meta = check_ray_meta(shaped(text, shape))
     summary = parse_json(chunks["RBVH"])
     instances = {"instances": {"first": "u32", "count": "u32"}} if "instances" in summary else {}
-    bvh = check_hierarchy(shaped(summary, HIERARCHY | instances))
+    update = {"update": UPDATE} if "update" in summary else {}
+    bvh = check_hierarchy(shaped(summary, HIERARCHY | instances | update))
     if "lighting" in meta or bvh["traversal"] in ("bvh4", "cwbvh8"):
         require(version[1] >= 4, "a later version")
     if instances:
         require(version[1] >= 5, "a later version")
         require(sum(bvh["instances"].values()) <= bvh["nodes"], "instances")
+    if update:
+        require(version[1] >= 6, "a later version")
+        check_update(bvh["update"], bvh)
     materials = shaped(parse_json(chunks["RMAT"]), (MATERIAL,))
     lights = [read_light(light) for light in shaped(parse_json(chunks["RLIT"]), ("any",))]
     triangles = read_triangles(chunks["RTRI"], materials)

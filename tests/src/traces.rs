@@ -417,6 +417,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
             bytes_per_node: 64,
             bytes_per_triangle: 40,
             instances: None,
+            update: None,
         },
         materials: vec![material("clay", false), material("chrome", true)],
         lights: vec![

@@ -2,7 +2,9 @@
 //! the posed vertices.
 
 use formats::Trace;
+use formats::raytrace::{RayTile, UpdateMethod};
 use formats::textrace::{Textrace, Tile};
+use formats::view::Eye;
 use parallax_tests::{has_lavapipe, program, refuse, run_ok};
 use serde_json::{Value, json};
 use std::fs;
@@ -274,6 +276,95 @@ fn scene_time_advances_per_frame() {
     let flags = ["--fps", "4", "--frame", "1"];
     let moving = content(folder, "rays", &scene, &at_time(&flags, "0.25"));
     assert_eq!(moving, content(folder, "rays", &there, &flags));
+}
+
+/// The hits of a refitted tree are those of a rebuilt one, on a scene with a moving node, a skin and a morph target.
+#[test]
+fn a_refitted_tree_has_the_hits_of_a_rebuilt_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let scene = animated(folder);
+    let picture = folder.join("picture.png");
+    let traced = |frame: &str, flags: &[&str]| {
+        let picture = picture.to_str().expect("a name");
+        let ours = [
+            "--fps",
+            "8",
+            "--geometry",
+            "--frame",
+            frame,
+            "--image",
+            picture,
+        ];
+        let flags = [flags, &ours].concat();
+        let Trace::Ray(trace) = capture(folder, "rays", &scene, &flags) else {
+            panic!("a ray trace");
+        };
+        let mut tile = RayTile::default();
+        let mut hits = Vec::new();
+        for eye in [Eye::Left, Eye::Right] {
+            for number in 0..trace.tables().tile_count() {
+                trace.decode_tile(eye, number, &mut tile).expect("a tile");
+                hits.push(format!("{:?}", tile.pixels));
+            }
+        }
+        let pixels = fs::read(picture).expect("a picture");
+        (
+            hits,
+            pixels,
+            trace.tables().bvh.update,
+            trace.container().version(),
+        )
+    };
+    for flags in [
+        &["--bvh", "bvh2"][..],
+        &["--bvh", "cwbvh8"],
+        &["--instances"],
+    ] {
+        for frame in ["0", "1", "5"] {
+            let with = |how| traced(frame, &[flags, &["--bvh-update", how]].concat());
+            let (plain, refit, rebuild) = (traced(frame, flags), with("refit"), with("rebuild"));
+            assert!(
+                plain.0 == refit.0 && plain.1 == refit.1,
+                "{flags:?}, frame {frame}"
+            );
+            assert!(
+                plain.0 == rebuild.0 && plain.1 == rebuild.1,
+                "{flags:?}, frame {frame}"
+            );
+            assert_eq!((plain.2, refit.3, rebuild.3), (None, (1, 6), (1, 6)));
+            let [refit, rebuild] = [refit.2, rebuild.2].map(|update| update.expect("an update"));
+            assert_eq!(rebuild.method, UpdateMethod::Rebuild);
+            let is_build = frame == "0";
+            let method = if is_build {
+                UpdateMethod::Rebuild
+            } else {
+                UpdateMethod::Refit
+            };
+            assert_eq!(refit.method, method);
+            assert!(0 < refit.triangles_written && refit.nodes <= rebuild.nodes);
+        }
+    }
+}
+
+#[test]
+fn an_update_needs_a_scene_that_moves() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = animated(folder.path());
+    let output = folder.path().join("trace").display().to_string();
+    let still = [&scene, "--animation", "none"];
+    for (words, found) in [(&["chess"][..], "chess"), (&still, "animated.gltf")] {
+        let mut tracegen = program("tracegen");
+        tracegen.arg("rays").args(words);
+        refuse(
+            tracegen.args(["--bvh-update", "refit", "-o", &output]),
+            &["--bvh-update: expected a scene that moves, found", found],
+        );
+    }
+    refuse(
+        program("tracegen").args(["rays", &scene, "--bvh-update", "keep", "-o", &output]),
+        &["--bvh-update", "rebuild", "refit"],
+    );
 }
 
 #[test]

@@ -302,6 +302,28 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
 }
 
 #[test]
+fn python_reads_updates_of_the_hierarchy_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("moving.raytrace");
+    for more in [&["rebuild"][..], &["refit", "--instances"]] {
+        let options = [
+            "--size",
+            "40x24",
+            "--visits",
+            "--frame",
+            "9",
+            "--bvh-update",
+        ];
+        rays("plant", &[&options[..], more].concat(), &path);
+        assert_eq!(check(&path), 2 * 40 * 24);
+        run_ok(program("replay").arg("validate").arg(&path));
+    }
+}
+
+#[test]
 fn python_reads_rays_beyond_whitteds_model_as_replay_does() {
     if !has_python() {
         return;

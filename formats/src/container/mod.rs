@@ -31,7 +31,7 @@ pub const MAGIC: [u8; 8] = *b"PLXTRACE";
 /// Latest minor version of each major version that readers support. A file declares the earliest version that
 /// has all of its features. Readers accept a later minor version, which may only add features, and refuse
 /// another major version.
-pub const VERSIONS: [(u16, u16); 5] = [(1, 5), (2, 1), (3, 1), (4, 0), (5, 1)];
+pub const VERSIONS: [(u16, u16); 5] = [(1, 6), (2, 1), (3, 1), (4, 0), (5, 1)];
 /// Major version of traces of scenes.
 pub(crate) const MAJOR_1: u16 = 1;
 /// Major version of `.textrace` files whose tables come after the tiles: traces of programs.

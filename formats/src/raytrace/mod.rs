@@ -198,6 +198,49 @@ pub struct BvhSummary {
     /// Which nodes are instances. Trees of meshes follow them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instances: Option<InstanceNodes>,
+    /// The work of the update from the frame before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update: Option<BvhUpdate>,
+}
+
+/// How a hierarchy follows a scene that moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum UpdateMethod {
+    /// Trees with a moved triangle are built anew.
+    #[default]
+    Rebuild,
+    /// Trees keep their topology; the boxes around moved triangles move.
+    Refit,
+}
+
+/// What the update from the frame before reads and writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BvhUpdate {
+    /// How.
+    pub method: UpdateMethod,
+    /// Triangles read: all of a rebuilt tree, or all of the leaves with a moved one.
+    pub triangles_read: u64,
+    /// Triangle slots written: all of a rebuilt tree, or the moved ones.
+    pub triangles_written: u64,
+    /// Instances read and written.
+    pub instances: u64,
+    /// Inner nodes written, instances not counted. A refit also reads them.
+    pub nodes: u64,
+}
+
+impl std::fmt::Display for BvhUpdate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{}: {} triangles read and {} written, {} instances, {} nodes",
+            name_of(&self.method),
+            self.triangles_read,
+            self.triangles_written,
+            self.instances,
+            self.nodes
+        )
+    }
 }
 
 /// The nodes that are instances of a tree with two levels.

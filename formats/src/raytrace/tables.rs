@@ -28,6 +28,8 @@ pub const TRIANGLE_ENTRY_BYTES: usize = 48;
 pub const TREES_AND_LIGHTING_MINOR: u16 = 4;
 /// Minor version of files whose tree has instances.
 pub const INSTANCES_MINOR: u16 = 5;
+/// Minor version of files that state the update of their tree.
+pub const UPDATE_MINOR: u16 = 6;
 /// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Maximum depth of reflections.
@@ -73,6 +75,9 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
     }
     if tables.bvh.instances.is_some() {
         container.expect_minor(INSTANCES_MINOR, BVH, "instances")?;
+    }
+    if tables.bvh.update.is_some() {
+        container.expect_minor(UPDATE_MINOR, BVH, "an update")?;
     }
     if tables.meta.lighting.is_some() {
         container.expect_minor(TREES_AND_LIGHTING_MINOR, META, "this lighting")?;
@@ -202,6 +207,20 @@ fn check_bvh(bvh: &BvhSummary) -> Result<(), Broken> {
     let end = u64::from(instances.first) + u64::from(instances.count);
     let expected = format_args!("instances below node {}", bvh.nodes);
     ensure(end <= bvh.nodes, what, expected, end)?;
+    let update = bvh.update.unwrap_or_default();
+    let inner = bvh.nodes - u64::from(instances.count);
+    ensure(
+        update.triangles_written <= update.triangles_read
+            && update.triangles_read <= bvh.triangles
+            && update.instances <= instances.count.into()
+            && update.nodes <= inner,
+        what,
+        format_args!(
+            "an update of at most {} triangles, {} instances and {inner} nodes, and no more triangles written than read",
+            bvh.triangles, instances.count
+        ),
+        format_args!("{update:?}"),
+    )?;
     ensure(
         bvh.sah_cost >= 0.0,
         what,

@@ -202,6 +202,17 @@ fn file(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     writer.into_bytes(tables).expect("writes")
 }
 
+/// Why tables are not written.
+fn unwritable(tables: &RaytraceTables) -> String {
+    let mut writer = RaytraceWriter::in_memory().expect("in memory");
+    for (eye, number) in eyes_and_tiles(tables) {
+        let tile = tile(tables, eye, number, 1);
+        let encoded = encode_ray_tile(&tile, false).expect("encodes");
+        writer.tile(&encoded).expect("appends");
+    }
+    writer.into_bytes(tables).expect_err("refused").to_string()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
@@ -345,6 +356,43 @@ fn a_trace_without_all_its_tiles_is_not_written() {
 }
 
 #[test]
+fn an_update_is_read_as_written_and_within_its_tree() {
+    let mut tables = tables(false);
+    let update = BvhUpdate {
+        method: UpdateMethod::Refit,
+        triangles_read: 7,
+        triangles_written: 5,
+        instances: 2,
+        nodes: 3,
+    };
+    tables.bvh.instances = Some(InstanceNodes { first: 4, count: 2 });
+    let [triangles_read, nodes] = [tables.bvh.triangles + 1, tables.bvh.nodes - 1];
+    tables.bvh.update = Some(update);
+    let trace = Raytrace::from_bytes(file(&tables, 1)).expect("opens");
+    assert_eq!(trace.tables(), &tables);
+    assert_eq!(trace.container().version(), (1, 6));
+    for bad in [
+        BvhUpdate {
+            triangles_read,
+            ..update
+        },
+        BvhUpdate {
+            triangles_written: 8,
+            ..update
+        },
+        BvhUpdate {
+            instances: 3,
+            ..update
+        },
+        BvhUpdate { nodes, ..update },
+    ] {
+        tables.bvh.update = Some(bad);
+        let text = unwritable(&tables);
+        assert!(text.contains("an update of at most"), "{text}");
+    }
+}
+
+#[test]
 fn triangles_out_of_order_or_without_a_material_are_refused() {
     let mut swapped = tables(false);
     swapped.triangles.swap(2, 3);
@@ -354,13 +402,7 @@ fn triangles_out_of_order_or_without_a_material_are_refused() {
         (swapped, "ascending primitive numbers"),
         (stray, "a material below 2"),
     ] {
-        let mut writer = RaytraceWriter::in_memory().expect("in memory");
-        for (eye, number) in eyes_and_tiles(&tables) {
-            let tile = tile(&tables, eye, number, 1);
-            let encoded = encode_ray_tile(&tile, false).expect("encodes");
-            writer.tile(&encoded).expect("appends");
-        }
-        let text = writer.into_bytes(&tables).expect_err("refused").to_string();
+        let text = unwritable(&tables);
         assert!(text.contains(expected), "{text}");
     }
 }

@@ -209,6 +209,9 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             self.container
                 .require_minor(tables::TREES_AND_LIGHTING_MINOR);
         }
+        if tables.bvh.update.is_some() {
+            self.container.require_minor(tables::UPDATE_MINOR);
+        }
         if tables.bvh.instances.is_some() {
             self.container.require_minor(tables::INSTANCES_MINOR);
             let expected = "that of a tree without instances";

@@ -24,6 +24,7 @@ mod energy_bounds;
 pub mod frame;
 pub mod gbuffer;
 pub mod hardware;
+pub mod hierarchy_update;
 pub mod loaded;
 pub mod order_rules;
 pub mod picture;

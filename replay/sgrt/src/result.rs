@@ -5,6 +5,7 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::dram::DramBytes;
 use super::hardware::Comparison;
+use super::hierarchy_update::HierarchyUpdate;
 use super::reads::Reads;
 use super::rows::RowSummary;
 use super::rules::Rule;
@@ -42,6 +43,9 @@ pub struct Report {
     pub result: Outcome,
     /// Result of the paper's plain reuse of every arrival.
     pub plain: Outcome,
+    /// The update of the hierarchy from the frame before, if the trace states one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hierarchy_update: Option<HierarchyUpdate>,
     /// The paper's values, if the trace stands in for one of its scenes.
     pub paper: Option<PaperValues>,
     /// Unit cycles saved against image error, if requested.

@@ -67,6 +67,7 @@ pub fn bvh() -> BvhSummary {
         bytes_per_node: 64,
         bytes_per_triangle: 48,
         instances: None,
+        update: None,
     }
 }
 

@@ -216,9 +216,10 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
     let mut text = heading(trace.container(), &meta.trace, trace.content_checksum());
     let instances = (bvh.instances).map(|of| format!("{} instances, ", of.count));
     let instances = instances.unwrap_or_default();
+    let update = (bvh.update).map(|of| format!("{of} from the frame before\n"));
     text += &format!(
         "hierarchy by {}, walked as {}: {}{} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
-         {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}, \
+         {} bytes a node, {} a triangle\n{}{} sample(s) a pixel, reflections {} deep, visits {}, \
          geometry {}, hierarchy {}\n\n",
         bvh.builder,
         name_of(&bvh.traversal),
@@ -230,6 +231,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
         bvh.sah_cost,
         bvh.bytes_per_node,
         bvh.bytes_per_triangle,
+        update.unwrap_or_default(),
         meta.samples_per_px,
         meta.max_depth,
         listed(meta.has_visits),

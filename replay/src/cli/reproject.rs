@@ -14,6 +14,7 @@ use report::sgrt::{self as document, Entry, ReprojectReport, Thumbnails};
 use report::view_rays::RayMaps;
 use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
+use sgrt::hierarchy_update::HierarchyUpdate;
 use sgrt::loaded::{LoadedTrace, RuleRun};
 use sgrt::picture;
 use sgrt::prefetch::RayPrefetching;
@@ -276,6 +277,7 @@ fn report_with<T>(
         },
         result: ours.outcome.clone(),
         plain: plain.outcome.clone(),
+        hierarchy_update: HierarchyUpdate::of(&loaded.frame().tables.bvh),
     };
     let pictures = if args.outputs.html.is_some() {
         Some(thumbnails(&loaded, &ours, &plain)?)

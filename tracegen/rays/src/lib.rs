@@ -5,6 +5,7 @@ mod cast;
 pub mod frame;
 mod light;
 mod material;
+pub mod moved;
 pub mod picture;
 pub mod ray;
 mod sampling;

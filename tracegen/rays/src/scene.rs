@@ -4,7 +4,7 @@ use super::bvh::{AlphaTest, Bvh, BvhError, TreeOptions};
 use super::material::Materials;
 use super::soup::Soup;
 use formats::raytrace::{RayLight, TraversalKind};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use scene::light::Sky;
 use scene::{Light, Scene, SceneError};
 use std::cell::RefCell;
@@ -50,11 +50,7 @@ impl TraceScene {
     /// # Errors
     /// The scene has too many triangles, or images that cannot be read.
     pub fn with_tree(mut scene: Scene, tree: TreeOptions) -> Result<Self, PrepareError> {
-        let soup = if tree.instances {
-            Soup::of_instances(&scene)
-        } else {
-            Soup::new(&scene)
-        };
+        let soup = soup(&scene, tree.instances);
         let (bvh, materials) = rayon::join(
             || {
                 let masked: Vec<bool> = scene
@@ -66,42 +62,46 @@ impl TraceScene {
                 if !tree.instances {
                     return Bvh::build_for(tree, &soup.triangles, masked);
                 }
-                let meshes: Vec<Vec<_>> = (scene.meshes.iter())
-                    .map(|mesh| {
-                        let corners = mesh.indices.chunks_exact(3);
-                        let at = |i: u32| mesh.positions[i as usize].to_array();
-                        corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]).collect()
-                    })
-                    .collect();
+                let meshes = meshes(&scene);
                 Bvh::build_instanced(tree, soup.origin, &meshes, &soup.placements, masked)
             },
             || Materials::new(&scene),
         );
         let (bvh, materials) = (bvh?, materials?);
         scene.images = Vec::new();
-        let lights = scene
-            .lights
-            .iter()
-            .map(|light| match *light {
-                Light::Directional { direction, color } => RayLight::Directional {
-                    direction: direction.normalize_or(-Vec3::Y).to_array(),
-                    color: color.to_array(),
-                },
-                Light::Point { position, color } => RayLight::Point {
-                    position: (position.as_dvec3() - soup.origin).as_vec3().to_array(),
-                    color: color.to_array(),
-                },
-            })
-            .collect();
-        let sky = Sky::new(&scene);
         Ok(Self {
+            lights: lights(&scene, soup.origin),
+            sky: Sky::new(&scene),
             scene,
             soup,
             bvh,
             materials,
-            lights,
-            sky,
         })
+    }
+
+    /// Poses the scene anew. The tree, which must have been built to be refitted, keeps its topology.
+    ///
+    /// # Errors
+    /// The pose is invalid, or the tree cannot follow it.
+    pub fn refit(
+        &mut self,
+        pose: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
+    ) -> Result<(), PrepareError> {
+        pose(&mut self.scene)?;
+        let (scene, instances) = (&self.scene, self.bvh.has_instances());
+        self.soup = soup(scene, instances);
+        let Soup {
+            origin, placements, ..
+        } = &self.soup;
+        if instances {
+            let meshes = meshes(scene);
+            self.bvh.refit_instanced(*origin, &meshes, placements)?;
+        } else {
+            self.bvh.refit(&self.soup.triangles)?;
+        }
+        self.lights = lights(scene, *origin);
+        self.sky = Sky::new(scene);
+        Ok(())
     }
 
     /// The alpha test of closest-hit rays.
@@ -113,6 +113,38 @@ impl TraceScene {
     pub fn shading(&self) -> Shading<'_> {
         Shading(self)
     }
+}
+
+fn soup(scene: &Scene, instances: bool) -> Soup {
+    if instances {
+        Soup::of_instances(scene)
+    } else {
+        Soup::new(scene)
+    }
+}
+
+/// The triangles of every mesh, in its own space.
+fn meshes(scene: &Scene) -> Vec<Vec<[[f32; 3]; 3]>> {
+    let triangles = scene.meshes.iter().map(|mesh| {
+        let corners = mesh.indices.chunks_exact(3);
+        let at = |i: u32| mesh.positions[i as usize].to_array();
+        corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]).collect()
+    });
+    triangles.collect()
+}
+
+fn lights(scene: &Scene, origin: DVec3) -> Vec<RayLight> {
+    let lights = scene.lights.iter().map(|light| match *light {
+        Light::Directional { direction, color } => RayLight::Directional {
+            direction: direction.normalize_or(-Vec3::Y).to_array(),
+            color: color.to_array(),
+        },
+        Light::Point { position, color } => RayLight::Point {
+            position: (position.as_dvec3() - origin).as_vec3().to_array(),
+            color: color.to_array(),
+        },
+    });
+    lights.collect()
 }
 
 /// Alpha test that lets rays through masked-out texels.

@@ -6,22 +6,25 @@ use super::choice::choice;
 use super::light_args::LightArgs;
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgAction, Args};
 use formats::container::AtomicFile;
 use formats::raytrace::{
-    EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
+    BvhSummary, EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
+    UpdateMethod,
 };
 use formats::text::name_of;
 use formats::textrace::TraceMeta;
 use rays::bvh::TreeOptions;
 use rays::frame::{RayFrame, trace_frame};
+use rays::moved::{Moved, Pose};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
-use scene::LoadOptions;
 use scene::paths::MAX_FRAMES;
+use scene::paths::Moments;
+use scene::{LoadOptions, Scene, SceneError};
 use shell::{Output, Progress, Threads, cannot_write, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -81,6 +84,10 @@ pub struct RaysArgs {
     /// Build one tree for each mesh that the scene repeats, and one over its instances: same hits, less memory.
     #[arg(long, conflicts_with_all = ["hierarchy", "all_columns"])]
     instances: bool,
+    /// How the tree follows a scene that moves, from frame 0 on; the trace states the work of the update from the
+    /// frame before [default: each frame has a new tree, and the trace states no update].
+    #[arg(long, value_name = "HOW", value_parser = update_parser())]
+    bvh_update: Option<UpdateMethod>,
     #[command(flatten)]
     light: LightArgs,
     #[command(flatten)]
@@ -110,6 +117,21 @@ fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
     ])
 }
 
+fn update_parser() -> impl TypedValueParser<Value = UpdateMethod> {
+    choice([
+        (
+            "rebuild",
+            UpdateMethod::Rebuild,
+            "Trees with a moved triangle are built anew",
+        ),
+        (
+            "refit",
+            UpdateMethod::Refit,
+            "Trees keep the topology of frame 0; boxes around moved triangles move",
+        ),
+    ])
+}
+
 impl RaysArgs {
     /// Whether every visited node and triangle is recorded.
     fn visits(&self) -> bool {
@@ -122,6 +144,7 @@ impl RaysArgs {
             treelet_bytes: self.treelets,
             is_in_node_order: self.child_order,
             instances: self.instances,
+            refit: self.bvh_update == Some(UpdateMethod::Refit),
         }
     }
 
@@ -192,20 +215,15 @@ fn capture(args: &RaysArgs, outputs: &[Output]) -> anyhow::Result<String> {
 /// Builds the hierarchy and the tables of the trace.
 fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, RaytraceTables)> {
     let SceneSetup {
-        mut scene,
+        scene,
         camera,
         hmd,
         frames,
         moments,
         ..
     } = setup;
-    let time_s = moments.scene_time_s(moments.frames.start);
-    scene.animate(time_s)?;
-    scene.pose(time_s as f32);
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
-    let scene = TraceScene::with_tree(scene, args.tree())?;
-    let traversal = args.bvh;
-    let bvh = scene.bvh.summary(traversal);
+    let (scene, bvh) = build(args, scene, &moments)?;
     let Some(views) = frames.first() else {
         bail!("the camera path has no frame");
     };
@@ -244,6 +262,58 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         triangles: Vec::new(),
     };
     Ok((scene, tables))
+}
+
+/// The scene at the frame's time with its hierarchy, and the hierarchy's summary.
+fn build(
+    args: &RaysArgs,
+    mut scene: Scene,
+    moments: &Moments,
+) -> anyhow::Result<(TraceScene, BvhSummary)> {
+    let frame = moments.frames.start;
+    // Motions displace the instances from where they are at time 0.
+    let at_rest = scene.instances.clone();
+    let pose = |scene: &mut Scene, frame| -> Result<(), SceneError> {
+        scene.instances.clone_from(&at_rest);
+        let time_s = moments.scene_time_s(frame);
+        scene.animate(time_s)?;
+        scene.pose(time_s as f32);
+        Ok(())
+    };
+    let Some(method) = args.bvh_update else {
+        pose(&mut scene, frame)?;
+        let scene = TraceScene::with_tree(scene, args.tree())?;
+        let bvh = scene.bvh.summary(args.bvh);
+        return Ok((scene, bvh));
+    };
+    ensure!(
+        scene.moves(),
+        "--bvh-update: expected a scene that moves, found {} without motion or animation",
+        &*args.scene.scene
+    );
+    let before = match frame.checked_sub(1) {
+        Some(before) => {
+            pose(&mut scene, before)?;
+            Some(Pose::of(&scene))
+        }
+        None => None,
+    };
+    let is_refit = method == UpdateMethod::Refit && frame > 0;
+    pose(&mut scene, if is_refit { 0 } else { frame })?;
+    let mut scene = TraceScene::with_tree(scene, args.tree())?;
+    if is_refit {
+        scene.refit(|scene| pose(scene, frame))?;
+    }
+    let moved = Moved::since(before.as_ref(), &scene.scene);
+    // Without a frame before, the update is the build.
+    let method = if is_refit {
+        method
+    } else {
+        UpdateMethod::Rebuild
+    };
+    let mut bvh = scene.bvh.summary(args.bvh);
+    bvh.update = Some(scene.bvh.update(args.bvh, method, &moved));
+    Ok((scene, bvh))
 }
 
 /// Traces the frame and writes its tiles; the writer lacks the tables.
@@ -292,9 +362,10 @@ fn result(tables: &RaytraceTables, frame: &RayFrame) -> String {
         .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
     let instances = bvh.instances.map(|of| format!("{} instances, ", of.count));
+    let update = bvh.update.map(|of| format!("\nupdate by {of}"));
     format!(
         "hierarchy: {}, {}{} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}\n\
-         rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray",
+         rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray{}",
         bvh.builder,
         instances.unwrap_or_default(),
         bvh.triangles,
@@ -305,6 +376,7 @@ fn result(tables: &RaytraceTables, frame: &RayFrame) -> String {
         kinds.join(", "),
         per_ray(stats.steps),
         per_ray(stats.triangle_tests),
+        update.unwrap_or_default(),
     )
 }
 

@@ -4,6 +4,7 @@ use super::Entry;
 use crate::columns::{Column, Columns, Row, Show, columns_of, name, pick};
 use crate::table::Table;
 use sgrt::accuracy::{Accuracy, ClassCounts};
+use sgrt::hierarchy_update::{HierarchyUpdate, UpdateBytes};
 use sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
 use sgrt::run::EnergyPj;
 use sgrt::timing::Timing;
@@ -218,6 +219,18 @@ fn image_error<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
         .real("ssim", "SSIM", "", 4, |r| r.outcome.ssim)
 }
 
+/// Bytes of the hierarchy's update.
+fn update<'a>(
+    key: &'static str,
+    name: &'static str,
+    bytes: fn(&HierarchyUpdate) -> Option<UpdateBytes>,
+) -> Column<'static, RuleRow<'a>> {
+    Column::new(key, name, "MB", Show::Millions(2), move |r: &RuleRow| {
+        let bytes = r.report.hierarchy_update.as_ref().and_then(bytes);
+        bytes.map(|bytes| bytes.total())
+    })
+}
+
 /// Reads of the detection, buffers and DRAM traffic.
 fn bytes<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
     vec![
@@ -238,6 +251,17 @@ fn bytes<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
         millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
             o.dram.gbuffer_bytes
         }),
+        millions("hierarchy_dram_bytes", "hierarchy in DRAM", "MB", |o| {
+            o.dram.hierarchy_bytes
+        }),
+        millions(
+            "reference_hierarchy_dram_bytes",
+            "both eyes in full",
+            "MB",
+            |o| o.reference_dram.hierarchy_bytes,
+        ),
+        update("update_bytes", "update", |u| Some(u.bytes)),
+        update("ploc_update_bytes", "rebuild by PLOC", |u| u.ploc),
         millions("dram_bytes", "all DRAM", "MB", |o| o.dram.total()),
         millions("reference_dram_bytes", "both eyes in full", "MB", |o| {
             o.reference_dram.total()
@@ -300,7 +324,7 @@ pub fn work(entries: &[Entry]) -> Table {
 pub fn traffic(entries: &[Entry]) -> Table {
     let mut figures = bytes();
     figures.retain(|figure| figure.heading.key != "row_test_applies");
-    by_rule(entries, figures)
+    by_rule(entries, figures).without_empty_columns()
 }
 
 /// Per trace, one row for the rule and one for plain reuse.

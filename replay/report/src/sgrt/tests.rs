@@ -59,6 +59,7 @@ fn entry_of(view: View) -> Entry {
             },
             result: ours.outcome,
             plain: plain.outcome,
+            hierarchy_update: None,
         },
         pictures: Some(Thumbnails {
             left: png.clone(),

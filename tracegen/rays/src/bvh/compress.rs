@@ -159,6 +159,13 @@ fn with_boxes(node: &Node8) -> CompressedNode {
     out
 }
 
+/// The boxes of a node that are decoded from its compressed form.
+pub(super) fn quantised_boxes(node: &Node8) -> [[[f32; 8]; 2]; 3] {
+    let mut compressed = with_boxes(node);
+    compressed.counts = node.children.map(|child| u8::from(child != Child::NONE));
+    compressed.bounds()
+}
+
 /// The nodes of the compressed tree as traversal reads them, and the first slot of every block.
 pub(super) fn compressed(nodes: &[Node8], blocks: usize) -> (Vec<Node8>, Vec<u32>) {
     let (compressed, slots) = compress(nodes, blocks);

@@ -57,7 +57,7 @@ impl Placement {
     }
 
     /// Whether rays can be moved to the mesh's space with little loss.
-    fn is_invertible(&self) -> bool {
+    pub(super) fn is_invertible(&self) -> bool {
         let matrix = self.transform.matrix3;
         let [size, inverse] = [matrix, matrix.inverse()].map(|m: DMat3| {
             let sizes = m.to_cols_array().map(f64::abs);
@@ -75,12 +75,12 @@ fn wound([a, b, c]: Triangle, mirrored: bool) -> Triangle {
     if mirrored { [a, c, b] } else { [a, b, c] }
 }
 
-fn in_range(p: &[f32; 3]) -> bool {
+pub(super) fn in_range(p: &[f32; 3]) -> bool {
     p.iter().all(|x| x.abs() <= LARGEST_COORDINATE)
 }
 
 /// Lowest and highest coordinates, as a triangle with that box.
-fn boxed(points: impl Iterator<Item = [f32; 3]>) -> Triangle {
+pub(super) fn boxed(points: impl Iterator<Item = [f32; 3]>) -> Triangle {
     let points = points.map(Vec3::from).map(|p| (p, p));
     let ends = points.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (min, max) = ends.unwrap_or_default();
@@ -123,19 +123,29 @@ pub(super) struct Instance {
     to_object: Columns,
     /// Number of its tree.
     pub tree: u32,
-    first_primitive: u32,
+    pub first_primitive: u32,
     mirrored: bool,
     /// Largest size in the mesh's space of a vector whose coordinates in the world are at most 1.
     inverse_size: f32,
     /// Box in the world.
-    bounds: (Vec3, Vec3),
+    pub bounds: (Vec3, Vec3),
     /// World position that its coordinates in the world are relative to.
     origin: [f64; 3],
     to_world: Columns,
 }
 
 impl Instance {
-    fn new(
+    /// All triangles that are in no other instance, which a tree has in the world.
+    pub fn of_rest(bounds: &Triangle, tree: usize) -> Self {
+        let here = Placement {
+            mesh: 0,
+            transform: DAffine3::IDENTITY,
+            mirrored: false,
+        };
+        Self::new(here, bounds, DVec3::ZERO, tree, 0)
+    }
+
+    pub fn new(
         placement: Placement,
         bounds: &Triangle,
         origin: DVec3,
@@ -235,6 +245,23 @@ pub(super) struct Below {
     pub first_instances: [u32; 3],
     /// Surface-area cost of what is below, for a ray through the upper tree.
     pub sah_cost: f64,
+    /// Whether the last tree is that of all triangles in no other instance.
+    pub has_rest: bool,
+}
+
+/// Half the surface area of a box.
+pub(super) fn half_area((min, max): (Vec3, Vec3)) -> f64 {
+    let [x, y, z] = (max - min).to_array().map(f64::from);
+    x * y + y * z + z * x
+}
+
+/// Costs of parts, each weighted by the share of its box in the area of the whole.
+pub(super) fn relative_cost(
+    whole: (Vec3, Vec3),
+    parts: impl Iterator<Item = ((Vec3, Vec3), f64)>,
+) -> f64 {
+    let costs = parts.map(|(bounds, cost)| half_area(bounds) * cost);
+    costs.sum::<f64>() / half_area(whole).max(f64::MIN_POSITIVE)
 }
 
 impl Bvh {
@@ -308,19 +335,11 @@ impl Bvh {
             let tree =
                 Self::build_with(options, &rest, |n| rest_numbers[n as usize], MAX_TRIANGLES)?;
             let (min, max) = tree.bounds;
-            let here = Placement {
-                mesh: 0,
-                transform: DAffine3::IDENTITY,
-                mirrored: false,
-            };
             let bounds = boxed([min, max].map(|p| p.to_array()).into_iter());
-            placed.push((
-                bounds,
-                Instance::new(here, &bounds, DVec3::ZERO, trees.len(), 0),
-            ));
+            placed.push((bounds, Instance::of_rest(&bounds, trees.len())));
             trees.push(tree);
         }
-        Self::over(options, placed, trees)
+        Self::over(options, placed, trees, !rest.is_empty())
     }
 
     /// A tree over the boxes of instances.
@@ -328,20 +347,14 @@ impl Bvh {
         options: TreeOptions,
         placed: Vec<(Triangle, Instance)>,
         trees: Vec<Self>,
+        has_rest: bool,
     ) -> Result<Self, BvhError> {
         let boxes: Vec<Triangle> = placed.iter().map(|(bounds, _)| *bounds).collect();
         // The mark keeps instances with equal boxes.
         let mut top = Self::build_with(options, &boxes, |n| n | MASKED, 1)?;
-        let half_area = |[min, max, _]: &Triangle| {
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(max[axis] - min[axis]));
-            x * y + y * z + z * x
-        };
-        let (min, max) = top.bounds;
-        let whole = half_area(&[min.to_array(), max.to_array(), min.to_array()]);
-        let costs = placed
-            .iter()
-            .map(|(bounds, instance)| half_area(bounds) * trees[instance.tree as usize].sah_cost);
-        let sah_cost = costs.sum::<f64>() / whole.max(f64::MIN_POSITIVE);
+        let parts = placed.iter();
+        let parts = parts.map(|(_, of)| (of.bounds, trees[of.tree as usize].sah_cost));
+        let sah_cost = relative_cost(top.bounds, parts);
         let first_instances = top.node_counts();
         let mut first_nodes = first_instances.map(|n| n + placed.len() as u32);
         let mut placed: Vec<_> = placed.into_iter().map(|(_, one)| Some(one)).collect();
@@ -370,6 +383,7 @@ impl Bvh {
             trees,
             first_instances,
             sah_cost,
+            has_rest,
         }));
         Ok(top)
     }

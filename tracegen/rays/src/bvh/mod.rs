@@ -18,6 +18,7 @@ mod leaf;
 pub mod node;
 mod on_demand;
 mod pages;
+mod refit;
 mod stacks;
 mod traverse;
 mod treelets;
@@ -39,6 +40,7 @@ use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
 pub use on_demand::TreeOptions;
 use on_demand::{OnDemandTree, node_bytes};
 use pages::in_large_pages;
+pub(crate) use refit::Objects;
 use stacks::Stacks;
 pub use traverse::TraversalStack;
 use traverse::{Two, Wide, Width, search, search_below};
@@ -55,6 +57,16 @@ pub enum BvhError {
         found: usize,
         /// Most that fit.
         limit: usize,
+    },
+    /// A part of the scene that a tree built for another time cannot follow.
+    #[error(
+        "{what} {number} cannot be refitted: expected finite coordinates and a matrix with an inverse at every time"
+    )]
+    NotRefitted {
+        /// Triangle or instance.
+        what: &'static str,
+        /// Its number.
+        number: u32,
     },
 }
 
@@ -159,7 +171,7 @@ impl Bvh {
             .map(|p| (p, p))
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
             .unwrap_or_default();
-        let stacks = Stacks::find(&kept, &numbers, most as usize);
+        let stacks = Stacks::find(&kept, &numbers, most as usize, options.refit);
         let built: Vec<_> = stacks.built.iter().map(|at| kept[*at as usize]).collect();
         let mut tree = build::build_binary(&built, most);
         stacks.expand(&mut tree, &kept);
@@ -213,6 +225,11 @@ impl Bvh {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => true,
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.on_demand.kind == Some(kind),
         }
+    }
+
+    /// Whether the leaves are instances.
+    pub(crate) fn has_instances(&self) -> bool {
+        self.below.is_some()
     }
 
     /// By block, the slot of its first triangle in a tree.
@@ -300,6 +317,7 @@ impl Bvh {
             bytes_per_node: node_bytes(traversal) as u32,
             bytes_per_triangle: TRIANGLE_BYTES,
             instances: None,
+            update: None,
         }
     }
 

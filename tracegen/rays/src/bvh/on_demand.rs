@@ -18,6 +18,8 @@ pub struct TreeOptions {
     pub is_in_node_order: bool,
     /// Whether a scene's repeated meshes are instances of one tree each.
     pub instances: bool,
+    /// Whether the tree can be refitted to other positions of its triangles.
+    pub refit: bool,
 }
 
 impl TreeOptions {
@@ -35,6 +37,7 @@ impl From<TraversalKind> for TreeOptions {
             treelet_bytes: None,
             is_in_node_order: false,
             instances: false,
+            refit: false,
         }
     }
 }

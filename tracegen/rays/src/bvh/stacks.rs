@@ -43,7 +43,8 @@ fn hash(triangle: &Vertices) -> u64 {
 
 impl Stacks {
     /// Finds the stacks. `numbers` are primitive numbers, ascending, with their mask flags.
-    pub fn find(triangles: &[Vertices], numbers: &[u32], most: usize) -> Self {
+    /// With `keep_all`, none is left out: triangles that are equal now may move apart.
+    pub fn find(triangles: &[Vertices], numbers: &[u32], most: usize, keep_all: bool) -> Self {
         let mut hashes: Vec<(u64, u32)> = triangles.iter().map(hash).zip(0..).collect();
         hashes.sort_unstable();
         let mut left_out = vec![false; triangles.len()];
@@ -59,7 +60,7 @@ impl Stacks {
                 if stack.len() <= most {
                     continue;
                 }
-                let opaque = |at: &u32| numbers[*at as usize] & MASKED == 0;
+                let opaque = |at: &u32| !keep_all && numbers[*at as usize] & MASKED == 0;
                 let end = stack
                     .iter()
                     .position(opaque)
@@ -174,7 +175,7 @@ mod tests {
         for count in [16_000, 64_000] {
             let triangles = vec![ACROSS; count];
             let numbers: Vec<u32> = (0..count as u32).collect();
-            assert_eq!(Stacks::find(&triangles, &numbers, 8).built, [0]);
+            assert_eq!(Stacks::find(&triangles, &numbers, 8, false).built, [0]);
             let bvh = Bvh::build(&triangles, |_| false).unwrap();
             for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
                 let (found, counts) = hit(&bvh, tree, &Only(0));
@@ -192,7 +193,10 @@ mod tests {
             triangles.push(ACROSS.map(|[x, y, _]| [x, y, -1.0]));
             let masked = |number| number < count;
             let numbers: Vec<u32> = (0..count).map(|n| n | MASKED).chain([count]).collect();
-            assert_eq!(Stacks::find(&triangles, &numbers, 8).built, [0, count]);
+            assert_eq!(
+                Stacks::find(&triangles, &numbers, 8, false).built,
+                [0, count]
+            );
             let bvh = Bvh::build(&triangles, masked).unwrap();
             for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
                 for only in [0, 1, 777, count - 1] {
@@ -222,6 +226,9 @@ mod tests {
     #[test]
     fn triangles_that_fit_into_a_leaf_are_not_a_stack() {
         let numbers: Vec<u32> = (0..8).collect();
-        assert_eq!(Stacks::find(&[ACROSS; 8], &numbers, 8).built, numbers);
+        assert_eq!(
+            Stacks::find(&[ACROSS; 8], &numbers, 8, false).built,
+            numbers
+        );
     }
 }
