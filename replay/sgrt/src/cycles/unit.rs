@@ -203,6 +203,10 @@ impl Unit {
     /// Finishes the item of a slot. Calls `returns` with the slot and cycle of each item whose return is now decided.
     pub fn finish(&mut self, slot: usize, now: u64, mut returns: impl FnMut(usize, u64)) {
         self.set(slot, State::Finished);
+        if self.order.is_none() && self.group_items == 1 {
+            returns(slot, self.output_cycle(slot, now));
+            return;
+        }
         if self.order.is_none() {
             let Slot { batch, group, .. } = self.slots[slot];
             let finished = self.groups.entry((batch, group.0)).or_default();
