@@ -203,11 +203,7 @@ impl Unit {
     /// Finishes the item of a slot. Calls `returns` with the slot and cycle of each item whose return is now decided.
     pub fn finish(&mut self, slot: usize, now: u64, mut returns: impl FnMut(usize, u64)) {
         self.set(slot, State::Finished);
-        if self.order.is_none() && self.group_items == 1 {
-            returns(slot, self.output_cycle(slot, now));
-            return;
-        }
-        if self.order.is_none() {
+        if self.group_items > 1 {
             let Slot { batch, group, .. } = self.slots[slot];
             let finished = self.groups.entry((batch, group.0)).or_default();
             finished.push(slot);
@@ -216,6 +212,10 @@ impl Unit {
                     returns(slot, self.output_cycle(slot, now));
                 }
             }
+            return;
+        }
+        if self.order.is_none() {
+            returns(slot, self.output_cycle(slot, now));
             return;
         }
         while let Some(first) = self.order.as_ref().and_then(|order| order.front().copied())
