@@ -18,11 +18,12 @@ GPU = """cache.node_l1_bytes = 16384, cache.triangle_l1_bytes = 16384, cache.l1_
     cache.l2_ways = 16, cache.l2_latency_cycles = 180, memory.latency_ns = 73, memory.bandwidth_gb_s = 56, tni.units = 8, tni.clock_mhz = 1365,
     tni.trv_pipelines = 4, tni.trv_cycles_per_wide_step = 1, tni.trv_depth_cycles = 4, tni.ist_pipelines = 4, tni.ist_depth_cycles = 8,
     tni.rays_in_flight = 128, cycles.l1_mshrs = 64, cycles.l2_mshrs = 512, cycles.prefetch.visits_dropped = true""".replace("\n", " ")
-# Rays that visit children in the order of the node drop no entries.
+# It goes on at the first inner child, and pops leaves and the other children from the stack. Such rays drop no entries.
 UNDROPPED = GPU.replace(", cycles.prefetch.visits_dropped = true", "")
 WARPS = "cycles.return_group_rays = 32"
 # The machine that is most like that of the papers.
-LIKE_PUBLISHED = "and 4 stack entries"
+LIKE_PUBLISHED = "and warps of 32 rays"
+INNER_FIRST = "cwbvh8 --child-order inner-first"
 # Machines, as the keys that differ from the default, and the tree of rays.
 MACHINES = {
     "default": ("", "bvh2"),
@@ -37,8 +38,10 @@ MACHINES = {
     "eight-wide tree": ("", "cwbvh8"),
     "as Vulkan-Sim": (GPU, "cwbvh8"),
     "and children in the order of the node": (UNDROPPED, "cwbvh8 --child-order node"),
-    "and warps of 32 rays": (f"{UNDROPPED}, {WARPS}", "cwbvh8 --child-order node"),
-    LIKE_PUBLISHED: (f"{UNDROPPED}, {WARPS}, cycles.prefetch.stack_entries = 4", "cwbvh8 --child-order node"),
+    "and leaves on the stack": (UNDROPPED, INNER_FIRST),
+    LIKE_PUBLISHED: (f"{UNDROPPED}, {WARPS}", INNER_FIRST),
+    "and 4 stack entries": (f"{UNDROPPED}, {WARPS}, cycles.prefetch.stack_entries = 4", INNER_FIRST),
+    "and 160x160 pixels": (f"{UNDROPPED}, {WARPS}, cycles.prefetch.stack_entries = 4", f"{INNER_FIRST} --size 160x160"),
     "as Vulkan-Sim, 32 rays, 4 stack entries": (f"{GPU}, cycles.prefetch.stack_entries = 4".replace("in_flight = 128", "in_flight = 32"), "cwbvh8"),
 }
 PUBLISHED = {"treelet": ["1.32", "-", "-"], "ttp": ["1.48", "98.9", "31.5"]}
@@ -88,7 +91,8 @@ def measure(study, trace, kinds, machine=""):
 
 def run(study):
     size, scenes = study.options.size, study.present(SCENES)
-    capture = lambda scene, tree: study.rays(scene, f"--size {size} --all-columns --bounces 1 --bvh {tree}", name=f"{scene}-{tree.replace(' ', '')}")
+    capture = lambda scene, tree: study.rays(scene, f"{'' if '--size' in tree else f'--size {size}'} --all-columns --bounces 1 --bvh {tree}",
+                                              name=f"{scene}-{tree.replace(' ', '')}")
     table, like = [], []
     machines = {machine: [] for machine in MACHINES}
     with ThreadPoolExecutor(2) as pool:

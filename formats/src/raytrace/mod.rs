@@ -252,14 +252,39 @@ pub struct InstanceNodes {
     pub count: u32,
 }
 
-impl BvhSummary {
-    /// The setting of traces whose rays visit children in the order of the node, not the nearest first.
-    pub const NODE_ORDER: (&str, &str) = ("child_order", "node");
+/// The order in which a ray visits the children of a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ChildOrder {
+    /// The nearest first. An entry of the stack behind the nearest triangle is dropped.
+    #[default]
+    Nearest,
+    /// As the node lists them. No entry of the stack is dropped.
+    Node,
+    /// Inner children as the node lists them, then leaves. Every leaf goes onto the stack, and no entry is dropped.
+    InnerFirst,
+}
 
-    /// Whether rays visit children in the order of the node.
-    pub fn is_in_node_order(&self) -> bool {
-        let mut settings = self.settings.iter();
-        settings.any(|(name, value)| (name.as_str(), value.as_str()) == Self::NODE_ORDER)
+impl ChildOrder {
+    /// The name and value that it has among a hierarchy's settings, if it is not the default.
+    pub fn setting(self) -> Option<(&'static str, &'static str)> {
+        let value = match self {
+            Self::Nearest => return None,
+            Self::Node => "node",
+            Self::InnerFirst => "inner-first",
+        };
+        Some(("child_order", value))
+    }
+}
+
+impl BvhSummary {
+    /// The order in which rays visit children.
+    pub fn child_order(&self) -> ChildOrder {
+        let is_set = |order: &ChildOrder| {
+            let mut settings = self.settings.iter();
+            settings.any(|(name, value)| Some((name.as_str(), value.as_str())) == order.setting())
+        };
+        let orders = [ChildOrder::Node, ChildOrder::InnerFirst];
+        orders.into_iter().find(is_set).unwrap_or_default()
     }
 
     /// Memory of all nodes and triangles in bytes.

@@ -11,8 +11,8 @@ use clap::builder::TypedValueParser;
 use clap::{ArgAction, Args};
 use formats::container::AtomicFile;
 use formats::raytrace::{
-    BvhSummary, EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
-    UpdateMethod,
+    BvhSummary, ChildOrder, EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter,
+    TraversalKind, UpdateMethod,
 };
 use formats::text::name_of;
 use formats::textrace::TraceMeta;
@@ -75,12 +75,13 @@ pub struct RaysArgs {
     /// Lay the nodes out in treelets of this size; without it, depth first.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(256..=1 << 20))]
     treelets: Option<u32>,
-    /// Visit a node's children in this order. Implies --visits with `node`, which is slower.
+    /// Visit a node's children in this order. Other orders than `nearest` imply --visits and are slower.
     #[arg(long, action = ArgAction::Set, value_parser = choice([
-        ("nearest", false, "The nearest child first"),
-        ("node", true, "As the node lists them; boxes are tested only before they go onto the stack"),
+        ("nearest", ChildOrder::Nearest, "The nearest child first"),
+        ("node", ChildOrder::Node, "As the node lists them; boxes are tested only before they go onto the stack"),
+        ("inner-first", ChildOrder::InnerFirst, "As `node`, but leaves after inner children, from the stack"),
     ]), default_value = "nearest", value_name = "ORDER", conflicts_with = "instances")]
-    child_order: bool,
+    child_order: ChildOrder,
     /// Build one tree for each mesh that the scene repeats, and one over its instances: same hits, less memory.
     #[arg(long, conflicts_with_all = ["hierarchy", "all_columns"])]
     instances: bool,
@@ -135,14 +136,14 @@ fn update_parser() -> impl TypedValueParser<Value = UpdateMethod> {
 impl RaysArgs {
     /// Whether every visited node and triangle is recorded.
     fn visits(&self) -> bool {
-        self.visits || self.all_columns || self.child_order
+        self.visits || self.all_columns || self.child_order != ChildOrder::Nearest
     }
 
     fn tree(&self) -> TreeOptions {
         TreeOptions {
             kind: self.bvh,
             treelet_bytes: self.treelets,
-            is_in_node_order: self.child_order,
+            child_order: self.child_order,
             instances: self.instances,
             refit: self.bvh_update == Some(UpdateMethod::Refit),
         }

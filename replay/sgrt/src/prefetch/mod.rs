@@ -53,7 +53,7 @@ impl Default for Prefetch {
 pub struct Step<'a> {
     /// What the ray visits.
     pub visit: Visit,
-    /// Entries popped since the last step that went down to a child; 0 if this one does.
+    /// Entries popped since the last step that went down to a child or pushed one; 0 if this one goes down.
     pub pops: u32,
     /// Entries left on the stack; the last one is popped next.
     pub stack: &'a [ChildKind],

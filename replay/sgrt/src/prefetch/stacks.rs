@@ -2,18 +2,20 @@
 //!
 //! A visit of a child right after its node means that the ray went down. Its other children whose boxes the ray hits before
 //! the nearest triangle so far went onto the stack, the nearest on top (or the first of the node, if rays visit children in
-//! its order). Any other visit is a pop. Entries above the popped
-//! one were dropped, because a nearer triangle had been found since.
+//! its order). Any other visit is a pop. Entries above the popped one were dropped, because a nearer triangle had been found
+//! since. Where leaves go onto the stack, every visit of a leaf is a pop.
 
 use super::Step;
 use crate::detect::intersect;
-use formats::raytrace::{BvhSummary, ChildKind, Hierarchy, HierarchyChild, RayGeometry, Visit};
+use formats::raytrace::{
+    BvhSummary, ChildKind, ChildOrder, Hierarchy, HierarchyChild, RayGeometry, Visit,
+};
 
 /// The boxes and triangles that rays meet.
 pub(super) struct Stacks<'a> {
     hierarchy: &'a Hierarchy,
     width: usize,
-    is_in_node_order: bool,
+    child_order: ChildOrder,
 }
 
 impl<'a> Stacks<'a> {
@@ -22,7 +24,7 @@ impl<'a> Stacks<'a> {
         Self {
             hierarchy,
             width: bvh.traversal.width(),
-            is_in_node_order: bvh.is_in_node_order(),
+            child_order: bvh.child_order(),
         }
     }
 
@@ -77,7 +79,11 @@ impl<'a> Stacks<'a> {
                 Visit::Node(node) => {
                     in_leaf = None;
                     if let Some(next) = visits.get(number + 1) {
+                        let pushed_from = stack.len();
                         went_down = self.push(ray, node, *next, limit, &mut stack);
+                        if stack.len() > pushed_from {
+                            pops = 0;
+                        }
                     }
                 }
                 Visit::Triangle(slot) => {
@@ -94,7 +100,7 @@ impl<'a> Stacks<'a> {
         }
     }
 
-    /// Pushes the children of a node that a ray hits. Returns true if `next` is one of the children, which is not pushed.
+    /// Pushes the children of a node that a ray hits. Returns true if the ray goes down to `next`, a child that is not pushed.
     fn push(
         &self,
         ray: &RayGeometry,
@@ -115,16 +121,21 @@ impl<'a> Stacks<'a> {
         if !children().any(|child| starts_with(child.kind, next)) {
             return false;
         }
-        let others = children().filter(|child| !starts_with(child.kind, next));
+        let goes_down =
+            self.child_order != ChildOrder::InnerFirst || matches!(next, Visit::Node(_));
+        let others = children().filter(|child| !goes_down || !starts_with(child.kind, next));
         let hit = others.filter_map(|child| Some((entry(ray, child, limit)?, child.kind)));
         let mut hit: Vec<(f32, ChildKind)> = hit.collect();
-        if self.is_in_node_order {
-            hit.reverse();
-        } else {
-            hit.sort_by(|a, b| b.0.total_cmp(&a.0));
+        match self.child_order {
+            ChildOrder::Nearest => hit.sort_by(|a, b| b.0.total_cmp(&a.0)),
+            ChildOrder::Node => hit.reverse(),
+            ChildOrder::InnerFirst => {
+                hit.reverse();
+                hit.sort_by_key(|(_, kind)| matches!(kind, ChildKind::Node(_)));
+            }
         }
         stack.extend(hit.into_iter().map(|(_, kind)| kind));
-        true
+        goes_down
     }
 
     /// Where a ray ends at a triangle; infinite if it does not. An alpha test, which the trace does not record, lets all

@@ -1,7 +1,7 @@
 use super::treelet::Treelets;
 use super::*;
 use crate::testing::bvh;
-use formats::raytrace::{HierarchyChild, HierarchyTriangle, SlotHit, TraversalKind};
+use formats::raytrace::{ChildOrder, HierarchyChild, HierarchyTriangle, SlotHit, TraversalKind};
 use proptest::prelude::*;
 
 fn child(kind: ChildKind, z: [f32; 2]) -> Option<HierarchyChild> {
@@ -98,32 +98,54 @@ fn boxes_behind_the_nearest_triangle_so_far_are_not_pushed() {
 }
 
 #[test]
-fn rays_that_visit_children_in_the_order_of_the_node_push_the_later_ones() {
-    let name_and_value = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
-    let bvh = BvhSummary {
-        settings: vec![name_and_value(BvhSummary::NODE_ORDER)],
-        traversal: TraversalKind::Bvh4,
-        ..bvh()
+fn the_order_of_children_says_what_goes_onto_the_stack() {
+    let found = |order: ChildOrder, visits: &[Visit]| {
+        let (name, value) = order.setting().expect("is not the default");
+        let bvh = BvhSummary {
+            settings: vec![(name.to_owned(), value.to_owned())],
+            traversal: TraversalKind::Bvh4,
+            ..bvh()
+        };
+        // A node with two leaves and a node with two leaves, the first of which are the farthest.
+        let leaf = |slot: u32| child(Leaf(slot, 1), [6.0 - slot as f32; 2]);
+        let children = [leaf(0), child(Node(1), [1.0, 9.0]), leaf(1), None];
+        let hierarchy = Hierarchy {
+            children: [children, [leaf(2), leaf(3), None, None]].concat(),
+            triangles: vec![HierarchyTriangle::default(); 4],
+        };
+        let mut found = Vec::new();
+        let stacks = Stacks::new(&hierarchy, &bvh);
+        stacks.for_visits((&ray(None), false), visits, false, |_, step| {
+            found.extend(step.map(|step| (step.pops, step.stack.to_vec())));
+        });
+        found
     };
-    // A node with three leaves, the first of which is the farthest.
-    let leaf = |slot: u32| child(ChildKind::Leaf(slot, 1), [4.0 - slot as f32; 2]);
-    let hierarchy = Hierarchy {
-        children: vec![leaf(0), leaf(1), leaf(2), None],
-        triangles: vec![HierarchyTriangle::default(); 3],
-    };
-    let stacks = Stacks::new(&hierarchy, &bvh);
-    let visits = [Visit::Node(0), Triangle(0), Triangle(1), Triangle(2)];
-    let mut found = Vec::new();
-    stacks.for_visits((&ray(None), false), &visits, false, |_, step| {
-        found.extend(step.map(|step| (step.pops, step.stack.to_vec())));
-    });
-    let expected = [
-        (0, vec![]),
-        (0, vec![Leaf(2, 1), Leaf(1, 1)]),
-        (1, vec![Leaf(2, 1)]),
-        (2, vec![]),
-    ];
-    assert_eq!(found, expected);
+    let [a, b, c, d] = [0, 1, 2, 3].map(Triangle);
+    let [root, inner] = [0, 1].map(Visit::Node);
+    assert_eq!(
+        found(ChildOrder::Node, &[root, a, inner, c, d, b]),
+        [
+            (0, vec![]),
+            (0, vec![Leaf(1, 1), Node(1)]),
+            (1, vec![Leaf(1, 1)]),
+            (0, vec![Leaf(1, 1), Leaf(3, 1)]),
+            (1, vec![Leaf(1, 1)]),
+            (2, vec![]),
+        ]
+    );
+    // Leaves wait for the inner node, and both nodes push all of theirs.
+    let pairs = vec![Leaf(1, 1), Leaf(0, 1)];
+    assert_eq!(
+        found(ChildOrder::InnerFirst, &[root, inner, c, d, a, b]),
+        [
+            (0, vec![]),
+            (0, pairs.clone()),
+            (1, [pairs.as_slice(), &[Leaf(3, 1)]].concat()),
+            (2, pairs),
+            (3, vec![Leaf(1, 1)]),
+            (4, vec![]),
+        ]
+    );
 }
 
 #[test]

@@ -122,12 +122,21 @@ impl Kernel for Scalar {
     }
 }
 
-/// [`Scalar`] for rays that visit children in the order of the node, and test a box before they push it but not when they
-/// pop it: children get their place in the node as entry distance, which is below all limits.
+/// [`Scalar`] for rays that visit children in the order of the node, with `INNER_FIRST` leaves after inner nodes. They test
+/// a box before they push it but not when they pop it: children get their place as entry distance, which is below all
+/// limits.
 #[derive(Clone, Copy)]
-pub struct NodeOrder;
+pub struct NodeOrder<const INNER_FIRST: bool>;
 
-impl Kernel for NodeOrder {
+impl<const INNER_FIRST: bool> NodeOrder<INNER_FIRST> {
+    fn place(children: &[Child], child: usize) -> f32 {
+        let waits = INNER_FIRST && children[child].is_leaf();
+        let after = if waits { children.len() } else { 0 };
+        f32::from_bits((child + after) as u32)
+    }
+}
+
+impl<const INNER_FIRST: bool> Kernel for NodeOrder<INNER_FIRST> {
     type Ray<'a> = PreparedRay<'a>;
 
     fn load<'a>(ray: &PreparedRay<'a>) -> PreparedRay<'a> {
@@ -135,12 +144,13 @@ impl Kernel for NodeOrder {
     }
 
     fn step2(ray: &PreparedRay<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
-        ([0.0; 2], Scalar::step2(ray, node, t_max).1)
+        let minus_near = std::array::from_fn(|child| -Self::place(&node.children, child));
+        (minus_near, Scalar::step2(ray, node, t_max).1)
     }
 
     fn step8(ray: &PreparedRay<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
         let mask = Scalar::step8(ray, node, t_max, near);
-        near.0 = std::array::from_fn(|place| f32::from_bits(place as u32));
+        near.0 = std::array::from_fn(|child| Self::place(&node.children, child));
         mask
     }
 

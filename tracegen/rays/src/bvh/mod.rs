@@ -30,7 +30,7 @@ mod tests;
 use crate::ray::{LARGEST_COORDINATE, Ray};
 use collapse::MAX_TRIANGLES;
 use count::Counter;
-use formats::raytrace::{BvhSummary, InstanceNodes, TraversalKind};
+use formats::raytrace::{BvhSummary, ChildOrder, InstanceNodes, TraversalKind};
 use glam::Vec3;
 use instances::Below;
 pub use instances::Placement;
@@ -105,7 +105,7 @@ pub struct Bvh {
     depth8: u32,
     on_demand: OnDemandTree,
     treelet_bytes: Option<u32>,
-    is_in_node_order: bool,
+    child_order: ChildOrder,
     /// Entries that a traversal stack needs.
     stack_size: usize,
     sah_cost: f64,
@@ -202,7 +202,7 @@ impl Bvh {
             depth8,
             on_demand,
             treelet_bytes: options.treelet_bytes,
-            is_in_node_order: options.is_in_node_order,
+            child_order: options.child_order,
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
@@ -301,10 +301,8 @@ impl Bvh {
             .treelet_bytes
             .map(|bytes| ("treelet_bytes".to_owned(), bytes.to_string()));
         settings.extend(treelets);
-        if self.is_in_node_order {
-            let (name, value) = BvhSummary::NODE_ORDER;
-            settings.push((name.to_owned(), value.to_owned()));
-        }
+        let child_order = self.child_order.setting();
+        settings.extend(child_order.map(|(name, value)| (name.to_owned(), value.to_owned())));
         BvhSummary {
             builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
             settings,
@@ -382,9 +380,14 @@ impl Bvh {
         if self.nodes2.is_empty() || !ray.is_valid() {
             return None;
         }
-        if C::RECORDS && self.is_in_node_order {
+        if C::RECORDS && self.child_order != ChildOrder::Nearest {
             debug_assert!(self.below.is_none());
-            return search::<ANY_HIT, NodeOrder, W, C, A>(self, ray, stack, counter, alpha);
+            return match self.child_order {
+                ChildOrder::InnerFirst => {
+                    search::<ANY_HIT, NodeOrder<true>, W, C, A>(self, ray, stack, counter, alpha)
+                }
+                _ => search::<ANY_HIT, NodeOrder<false>, W, C, A>(self, ray, stack, counter, alpha),
+            };
         }
         match (self.instructions, &self.below) {
             #[cfg(target_arch = "x86_64")]

@@ -4,7 +4,7 @@ use super::build::{Layout, emit_wide};
 use super::compress::{CompressedNode, compressed};
 use super::node::{NODE4_BYTES, Node2, Node8};
 use super::treelets::in_treelets;
-use formats::raytrace::TraversalKind;
+use formats::raytrace::{ChildOrder, TraversalKind};
 use obvhs::bvh2::Bvh2;
 
 /// The tree that is traversed.
@@ -14,8 +14,8 @@ pub struct TreeOptions {
     pub kind: TraversalKind,
     /// Size of its treelets. Without, nodes are depth first.
     pub treelet_bytes: Option<u32>,
-    /// Whether recorded rays visit children in the order of the node, not the nearest first.
-    pub is_in_node_order: bool,
+    /// The order in which recorded rays visit children.
+    pub child_order: ChildOrder,
     /// Whether a scene's repeated meshes are instances of one tree each.
     pub instances: bool,
     /// Whether the tree can be refitted to other positions of its triangles.
@@ -35,7 +35,7 @@ impl From<TraversalKind> for TreeOptions {
         Self {
             kind,
             treelet_bytes: None,
-            is_in_node_order: false,
+            child_order: ChildOrder::Nearest,
             instances: false,
             refit: false,
         }

@@ -7,8 +7,8 @@ use crate::bvh::TreeOptions;
 use crate::ray::Ray;
 use crate::scene::TraceScene;
 use formats::raytrace::{
-    ChildKind, Hierarchy, HierarchyTriangle, Outcome, RayGeometry, RayKind, RayRecord, RayTile,
-    Raytrace, TraversalKind, Visit,
+    ChildKind, ChildOrder, Hierarchy, HierarchyTriangle, Outcome, RayGeometry, RayKind, RayRecord,
+    RayTile, Raytrace, TraversalKind, Visit,
 };
 use formats::view::Eye;
 use glam::{DVec3, Vec3};
@@ -175,9 +175,13 @@ fn walk(
 #[test]
 fn a_walk_of_the_stored_tree_makes_the_stored_visits() {
     for kind in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
-        for is_in_node_order in [false, true] {
+        for child_order in [
+            ChildOrder::Nearest,
+            ChildOrder::Node,
+            ChildOrder::InnerFirst,
+        ] {
             walks_make_the_stored_visits(TreeOptions {
-                is_in_node_order,
+                child_order,
                 ..kind.into()
             });
         }
@@ -187,7 +191,7 @@ fn a_walk_of_the_stored_tree_makes_the_stored_visits() {
 fn walks_make_the_stored_visits(options: TreeOptions) {
     let (rays, hierarchy) = columns(options);
     let mut boxes = ReferenceWalk::new(&hierarchy, options.kind.width());
-    boxes.is_in_node_order = options.is_in_node_order;
+    boxes.child_order = options.child_order;
     let mut walked = [0u32; 4];
     for ray in &rays {
         let Some((visits, deepest)) = walk(ray, &hierarchy, &boxes) else {

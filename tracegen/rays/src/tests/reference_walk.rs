@@ -1,7 +1,7 @@
 //! An independent walk of a hierarchy by the rules of FORMAT.md (Traversal), in plain `f32`, which
 //! counts the work of a ray.
 
-use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild};
+use formats::raytrace::{ChildKind, ChildOrder, Hierarchy, HierarchyChild};
 use glam::Vec3;
 use rays::bvh::count::Counts;
 use rays::ray::{PreparedRay, Ray};
@@ -22,8 +22,8 @@ pub struct ReferenceWalk<'a> {
     /// Children of a node.
     width: usize,
     bounds: (Vec3, Vec3),
-    /// Children come in the order of the node, and boxes are not compared again when they are popped.
-    pub is_in_node_order: bool,
+    /// The order of children. Only the nearest first compares boxes again when they are popped.
+    pub child_order: ChildOrder,
 }
 
 impl<'a> ReferenceWalk<'a> {
@@ -38,7 +38,7 @@ impl<'a> ReferenceWalk<'a> {
             hierarchy,
             width,
             bounds,
-            is_in_node_order: false,
+            child_order: ChildOrder::Nearest,
         }
     }
 
@@ -130,7 +130,10 @@ impl<'a> ReferenceWalk<'a> {
             .flatten()
             .filter_map(|child| Some((entry(ray, axes, child, limit)?, child.kind)))
             .collect();
-        if self.is_in_node_order {
+        if self.child_order == ChildOrder::InnerFirst {
+            hit.sort_by_key(|(_, kind)| matches!(kind, ChildKind::Leaf(..)));
+        }
+        if self.child_order != ChildOrder::Nearest {
             return hit.into_iter().map(|(_, kind)| (0.0, kind)).collect();
         }
         // Two that are entered at the same distance stay in order. Of more, nodes come before
