@@ -30,6 +30,7 @@ mod depth;
 mod every_fragment;
 mod far_field;
 mod fragments;
+mod highlights;
 mod layers;
 mod motion;
 mod parts;

@@ -9,6 +9,7 @@ use super::geometry;
 use super::lighting::Lighting;
 use formats::textrace::Pass;
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
+use glam::Vec3;
 use record::{CaptureCounts, Captured, Capturer, RecordError, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
@@ -123,6 +124,11 @@ impl CaptureJob<'_> {
             near,
             far,
         );
+        let between = (views.eyes.iter())
+            .map(|eye| Vec3::from_array(eye.position) / 2.0)
+            .sum();
+        let share = self.planner.settings().highlight_disparity;
+        lighting.highlights = share.map(|share| (between, share));
         let (culling, number) = (self.planner.settings().culling, views.frame);
         let (plan, rig) = (self.plan(views)?, self.rig(views));
         Ok(Frame::new(

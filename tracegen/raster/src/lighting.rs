@@ -21,6 +21,9 @@ pub struct Lighting {
     pub points: Vec<(Vec3, Vec3)>,
     /// Shadow cascades, nearest first.
     pub cascades: Vec<Cascade>,
+    /// The point between the eyes, and the share of the distance from there to an eye at which the eye's highlights are
+    /// computed. Without, each eye sees the highlights at its own position.
+    pub highlights: Option<(Vec3, f32)>,
 }
 
 impl Lighting {
@@ -43,6 +46,13 @@ impl Lighting {
             sky: Sky::new(scene),
             points,
             cascades: Vec::new(),
+            highlights: None,
         }
+    }
+
+    /// Where the highlights of the eye at a position are seen from.
+    pub fn highlights_from(&self, eye: Vec3) -> Vec3 {
+        self.highlights
+            .map_or(eye, |(between, share)| between + share * (eye - between))
     }
 }

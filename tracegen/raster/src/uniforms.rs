@@ -32,7 +32,7 @@ impl ViewData {
     pub fn of_eye(view: &View<'_>, capacity: u32) -> Self {
         Self::new(
             view.clip_from_world(),
-            Vec3::from_array(view.layer.view.position),
+            (view.lighting).highlights_from(Vec3::from_array(view.layer.view.position)),
             view.lighting,
             capacity,
         )

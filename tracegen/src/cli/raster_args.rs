@@ -93,7 +93,7 @@ pub struct RasterArgs {
     /// chooses the least error whose median frame time stays within the budget.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
           conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
-                                "cull_distance", "cull_px", "reuse_shading", "far_field", "foveate",
+                                "cull_distance", "cull_px", "reuse_shading", "highlight_disparity", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
     pub(super) auto: Option<Budget>,
     #[command(flatten)]
@@ -102,7 +102,7 @@ pub struct RasterArgs {
     /// followed by exceptions for single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. `--auto`
     /// prints its choice in this form.
     #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
-          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "reuse_shading", "far_field", "foveate",
+          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "reuse_shading", "highlight_disparity", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
     pub(super) technique: Option<Schedule>,
     #[command(flatten)]

@@ -61,6 +61,10 @@ pub struct TechniqueArgs {
     #[arg(long, value_name = "CONTRAST", num_args = 0..=1, require_equals = true, default_missing_value = "0.02",
           conflicts_with_all = ["multiview", "far_field", "foveate"])]
     reuse_shading: Option<f32>,
+    /// Disparity of highlights and mirrored light, as a share of that of the eyes' positions: 0 shows both eyes what the
+    /// point between them sees.
+    #[arg(long, value_name = "SHARE")]
+    highlight_disparity: Option<f32>,
     /// Draw everything beyond a distance once for both eyes. The distance is given in metres (7.5), as the
     /// largest error in pixels (1px), or as the distance of least cost within an error (least-work:2px;
     /// least-work alone means 1px).
@@ -182,6 +186,7 @@ impl TechniqueArgs {
             (self.hidden_area_mesh.is_some(), "--hidden-area-mesh"),
             (self.multiview, "--multiview"),
             (self.reuse_shading.is_some(), "--reuse-shading"),
+            (self.highlight_disparity.is_some(), "--highlight-disparity"),
             (self.far_field.is_some(), "--far-field"),
             (self.foveate.is_some(), "--foveate"),
         ];
@@ -208,6 +213,7 @@ impl TechniqueArgs {
             distance_cull: (self.cull_distance.map(DistanceCull::Metres))
                 .or(self.cull_px.map(DistanceCull::Pixels)),
             half_rate: None,
+            highlight_disparity: self.highlight_disparity,
             shading_reuse: (self.reuse_shading).map(|contrast| ShadingReuse { contrast }),
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
                 split,

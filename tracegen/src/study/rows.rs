@@ -46,6 +46,8 @@ pub enum Setting {
     Rate,
     /// What the right eye takes of the left eye's colours.
     ShadingReuse,
+    /// Where highlights are seen from.
+    Highlights,
     /// Where and how both eyes share a picture of the far field.
     FarField,
     /// How the periphery is shaded more coarsely.
@@ -78,8 +80,9 @@ impl Part {
     /// Every technique with the settings that a search tries on a display.
     pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
-        // A search renders single frames, and every other frame at half rate has no picture of its own.
-        parts.retain(|part| part.setting() != Setting::Rate);
+        // A search renders single frames, and every other frame at half rate has no picture of its own. Highlights cost the
+        // same wherever they are seen from.
+        parts.retain(|part| ![Setting::Rate, Setting::Highlights].contains(&part.setting()));
         parts.extend(VARIANTS.iter().map(Self::switch));
         let by_angle = || MODES.iter().filter(|mode| mode.rates_of.is_none());
         parts.extend(
@@ -197,6 +200,13 @@ const TECHNIQUES: &[Switch] = &[
         false,
         Setting::ShadingReuse,
         |s| s.shading_reuse = Some(ShadingReuse::default()),
+    ),
+    Switch(
+        "highlights-between-eyes",
+        "Highlights as seen between the eyes",
+        false,
+        Setting::Highlights,
+        |s| s.highlight_disparity = Some(0.0),
     ),
     Switch(
         "far-field",

@@ -33,6 +33,10 @@ pub struct Settings {
     /// Colours of the left eye that the right eye takes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shading_reuse: Option<ShadingReuse>,
+    /// Disparity of highlights and mirrored light, as a share of that of the eyes' positions: with 0, both eyes see them as
+    /// from the point between the eyes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub highlight_disparity: Option<f32>,
     /// One picture of far geometry for both eyes.
     pub far_field: Option<FarField>,
     /// Coarser shading in the periphery.
@@ -188,6 +192,15 @@ impl Settings {
                     found: other.into(),
                 });
             }
+        }
+        if let Some(share) = self.highlight_disparity
+            && !(0.0..=4.0).contains(&share)
+        {
+            return Err(SettingsError {
+                what: "disparity of highlights",
+                expected: "0 to 4 times that of the eyes".into(),
+                found: share.to_string(),
+            });
         }
         if let Some(far_field) = &self.far_field {
             far_field.check()?;
