@@ -53,7 +53,7 @@ fn sorted_rays_fetch_other_lines_only_from_caches_that_lose_some() {
     let trace = folder.path().join("chess.raytrace");
     let words = "rays chess --all-columns --bounces 2 --size 48x40 -o";
     run_ok(program("tracegen").args(words.split(' ')).arg(&trace));
-    let sorts = ["none", "generation", "direction", "origin"];
+    let sorts = ["none", "generation", "direction", "origin", "treelet"];
     let bytes = |l2_bytes: u32, eyes: &str| {
         let config = folder.path().join("caches.toml");
         let caches = "[cache]\nnode_l1_bytes = 4096\ntriangle_l1_bytes = 4096\nl2_bytes";
@@ -66,7 +66,7 @@ fn sorted_rays_fetch_other_lines_only_from_caches_that_lose_some() {
     };
     for eyes in ["z2-lrta", "z2-sta"] {
         let [none, others @ ..] = bytes(1 << 24, eyes);
-        assert_eq!(others, [none; 3], "{eyes}");
+        assert_eq!(others, [none; 4], "{eyes}");
         let mut small = bytes(1 << 14, eyes);
         small.sort_unstable();
         assert!(small.windows(2).all(|two| two[0] < two[1]), "{small:?}");
@@ -75,6 +75,11 @@ fn sorted_rays_fetch_other_lines_only_from_caches_that_lose_some() {
     let words = "rays chess --visits --size 48x40 -o";
     run_ok(program("tracegen").args(words.split(' ')).arg(&plain));
     let words = ["reproject", "--sort-rays", "origin"];
+    let timed = ["reproject", "--sort-rays", "treelet", "--timing", "cycle"];
+    refuse(
+        program("replay").args(timed).arg(&trace),
+        &["run to their end, found treelet"],
+    );
     refuse(
         program("replay").args(words).arg(&plain),
         &[

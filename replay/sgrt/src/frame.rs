@@ -112,6 +112,11 @@ pub enum FrameError {
         "{0} ({1}): expected a trace with its hierarchy and the geometry of its rays (tracegen rays --all-columns), found a trace without"
     )]
     NoColumns(&'static str, &'static str),
+    /// A sort in which rays wait between their visits, in the cycle-level model.
+    #[error(
+        "tni.ray_sort: expected with --timing cycle a sort whose rays run to their end, found {0}"
+    )]
+    Interrupted(&'static str),
     /// An unreadable hierarchy.
     #[error("{0}")]
     Hierarchy(TileError),

@@ -286,7 +286,7 @@ pub(super) fn misses_of(
         let runs = caches.par_iter_mut().zip(&mut found).zip(choices);
         runs.for_each(|((caches, found), (kept, config))| {
             for (batch, tiles) in batches.iter().zip(&tiles) {
-                for_rays(frame, plan, config.tni.ray_sort, batch, tiles, |of| {
+                for_rays(frame, plan, config, batch, tiles, |of| {
                     if kept(eye_of(of.at), of.sample, RayClass::of(of.ray)) {
                         caches.tile = of.at.tile;
                         let misses = &mut found[of.at.pass as usize][of.at.tile as usize];
@@ -318,6 +318,7 @@ pub(super) fn misses_in_usual_order(
 }
 
 /// A ray in its turn.
+#[derive(Clone, Copy)]
 pub(super) struct RayTurn<'a> {
     pub at: TileRef,
     /// Its pixel in the eye's image.
@@ -332,21 +333,24 @@ pub(super) struct RayTurn<'a> {
     pub geometry: Option<&'a RayGeometry>,
 }
 
-/// Calls `visit` for each ray of a batch in the order of `plan` and `sort`.
+/// Calls `visit` for each ray of a batch, or for each part of a ray that waits between its parts, in the order of `plan`
+/// and of the configured sort.
 pub(super) fn for_rays(
     frame: &Frame,
     plan: &RayPlan,
-    sort: RaySort,
+    config: &SgrtConfig,
     batch: &[WorkItem],
     tiles: &[RayTile],
     visit: impl FnMut(RayTurn<'_>),
 ) {
+    let sort = config.tni.ray_sort;
     if sort == ray_sort::none() {
         return for_rays_of_pixels(frame, plan, batch, tiles, visit);
     }
     let mut turns = Vec::new();
     for_rays_of_pixels(frame, plan, batch, tiles, |turn| turns.push(turn));
-    ray_sort::sort(sort, &mut turns);
+    let caches = (&frame.tables.bvh, config.cache.node_l1_bytes);
+    let turns = ray_sort::sort(sort, turns, caches);
     turns.into_iter().for_each(visit);
 }
 

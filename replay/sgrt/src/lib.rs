@@ -33,6 +33,7 @@ pub mod prefetch;
 pub mod presets;
 mod ray_batches;
 pub mod ray_kinds;
+mod ray_queues;
 pub mod ray_sort;
 pub mod readings;
 pub mod reads;

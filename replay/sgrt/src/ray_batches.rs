@@ -86,8 +86,7 @@ impl<'a> RayBatches<'a> {
         let frame = self.model.frame;
         let bvh = &frame.tables.bvh;
         let line_bytes = self.model.config.cache.line_bytes;
-        let sort = self.model.config.tni.ray_sort;
-        for_rays(frame, self.plan, sort, items, tiles, |of| {
+        for_rays(frame, self.plan, self.model.config, items, tiles, |of| {
             let eye = eye_of(of.at);
             let is_complete = eye == Eye::Left || self.way == Way::Reference;
             let decision = self.decisions.get(of.sample).filter(|_| !is_complete);

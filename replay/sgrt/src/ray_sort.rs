@@ -5,6 +5,8 @@
 //! Traversal for GPU Ray Tracing", Eurographics 2010), who sort many more rays at a time.
 
 use super::hardware::RayTurn;
+use super::ray_queues;
+use formats::raytrace::{BvhSummary, Visit};
 use sim::registry::Named;
 
 /// A row of the table of orders.
@@ -14,12 +16,27 @@ pub struct SortRow {
     pub name: &'static str,
     /// One line of help.
     pub help: &'static str,
-    key: Option<Key>,
-    /// Whether the key depends on origins and directions.
+    order: Order,
+    /// Whether the order depends on origins and directions.
     pub(super) needs_geometry: bool,
 }
 
-type Key = fn(&Spot) -> [u32; 2];
+#[derive(Debug)]
+enum Order {
+    /// Pixel by pixel.
+    Pixels,
+    /// By a key of two numbers.
+    Key(fn(&Spot) -> [u32; 2]),
+    /// By the treelet that each ray waits for.
+    Queues,
+}
+
+impl SortRow {
+    /// Whether rays wait for others between their visits.
+    pub(super) fn interrupts_rays(&self) -> bool {
+        matches!(self.order, Order::Queues)
+    }
+}
 
 /// A named order of the rays of a batch.
 pub type RaySort = Named<SortRow>;
@@ -29,27 +46,33 @@ sim::rows! { SortRow:
     RaySort::new(&SortRow {
         name: "generation",
         help: "By depth and kind: primary rays first, then their shadow rays, and so on",
-        key: Some(|of| [of.generation, 0]),
+        order: Order::Key(|of| [of.generation, 0]),
         needs_geometry: false,
     });
     RaySort::new(&SortRow {
         name: "direction",
         help: "By octant of the direction, then by origin along a Morton curve",
-        key: Some(|of| [of.octant, of.cell]),
+        order: Order::Key(|of| [of.octant, of.cell]),
         needs_geometry: true,
     });
     RaySort::new(&SortRow {
         name: "origin",
         help: "By origin along a Morton curve, then by octant of the direction",
-        key: Some(|of| [of.cell, of.octant]),
+        order: Order::Key(|of| [of.cell, of.octant]),
         needs_geometry: true,
+    });
+    RaySort::new(&SortRow {
+        name: "treelet",
+        help: "By the part of the hierarchy, as large as a node cache, that each ray visits next",
+        order: Order::Queues,
+        needs_geometry: false,
     });
 }
 
 static NONE: SortRow = SortRow {
     name: "none",
     help: "Pixel by pixel, each with its whole tree of rays",
-    key: None,
+    order: Order::Pixels,
     needs_geometry: false,
 };
 
@@ -70,10 +93,20 @@ struct Spot {
     cell: u32,
 }
 
-/// Sorts the rays of a batch. Equal ones keep their order.
-pub(super) fn sort(by: RaySort, turns: &mut [RayTurn<'_>]) {
-    let Some(key) = by.row().key else {
-        return;
+/// Sorts the rays of a batch, whose node caches have `node_l1_bytes`. Equal ones keep their order.
+pub(super) fn sort<'a>(
+    by: RaySort,
+    mut turns: Vec<RayTurn<'a>>,
+    (bvh, node_l1_bytes): (&BvhSummary, u64),
+) -> Vec<RayTurn<'a>> {
+    let key = match &by.row().order {
+        Order::Pixels => return turns,
+        Order::Queues => {
+            return ray_queues::queued(turns, |node| {
+                bvh.address(Visit::Node(node)) / node_l1_bytes
+            });
+        }
+        Order::Key(key) => key,
     };
     let origins = turns.iter().filter_map(|turn| Some(turn.geometry?.origin));
     let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
@@ -101,6 +134,7 @@ pub(super) fn sort(by: RaySort, turns: &mut [RayTurn<'_>]) {
         spot
     };
     turns.sort_by_cached_key(|turn| key(&spot(turn)));
+    turns
 }
 
 #[cfg(test)]
@@ -139,8 +173,12 @@ mod tests {
             visits: &[],
             geometry: Some(&geometry[sample]),
         };
-        let mut turns: Vec<_> = (0..rays.len()).map(turn).collect();
-        sort(RaySort::find(by).unwrap(), &mut turns);
+        let turns: Vec<_> = (0..rays.len()).map(turn).collect();
+        let turns = sort(
+            RaySort::find(by).unwrap(),
+            turns,
+            (&BvhSummary::default(), 1),
+        );
         turns.iter().map(|turn| rays[turn.sample].0).collect()
     }
 

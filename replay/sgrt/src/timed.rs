@@ -51,6 +51,9 @@ impl TracedTiming {
         }
         check_lines(&tables.bvh, model.config)?;
         check_sort(source, model.config.tni.ray_sort)?;
+        if model.config.tni.ray_sort.row().interrupts_rays() {
+            return Err(FrameError::Interrupted(model.config.tni.ray_sort.name()));
+        }
         let machine = Machine::new(model.config, tables.bvh.traversal);
         let prefetcher = Prefetcher::new(&model.config.cycles.prefetch, source)?;
         let units = (&machine, prefetcher.as_ref());

@@ -23,13 +23,7 @@ impl Avx2 {
 /// The ray, broadcast into registers.
 #[derive(Clone, Copy)]
 pub struct Ray {
-    /// By axis, for two boxes: minus the near reciprocal twice, then the far reciprocal twice. With
-    /// entries negated, one minimum serves both ends.
-    scale2: [__m128; 3],
-    /// Added to the scaled planes.
-    offset2: [__m128; 3],
-    /// Permutation that puts near planes before far planes.
-    order2: [__m128i; 3],
+    two: Two,
     t_min: f32,
     /// By axis, for eight boxes.
     near_reciprocal: [__m256; 3],
@@ -47,26 +41,48 @@ pub struct Ray {
     shear4: [__m128; 2],
 }
 
+/// What the test of two boxes needs.
+#[derive(Clone, Copy)]
+struct Two {
+    /// By axis: minus the near reciprocal twice, then the far reciprocal twice. With entries negated, one minimum serves
+    /// both ends.
+    scale: [__m128; 3],
+    /// Added to the scaled planes.
+    offset: [__m128; 3],
+    /// Permutation that puts near planes before far planes.
+    order: [__m128i; 3],
+}
+
 impl Kernel for Avx2 {
     type Ray<'a> = Ray;
 
     #[inline(always)]
-    fn load(ray: &PreparedRay<'_>) -> Ray {
+    fn load(ray: &PreparedRay<'_>, for_step2: bool) -> Ray {
         let o: &[f32; 3] = ray.ray.origin.as_ref();
         let (nr, fr) = (ray.near_reciprocal, ray.far_reciprocal);
         let (ns, fs) = (ray.near_shift, ray.far_shift);
         // SAFETY: dispatch ensures AVX2.
         unsafe {
+            let mut two = Two {
+                scale: [_mm_setzero_ps(); 3],
+                offset: [_mm_setzero_ps(); 3],
+                order: [_mm_setzero_si128(); 3],
+            };
+            if for_step2 {
+                two = Two {
+                    scale: std::array::from_fn(|a| _mm_setr_ps(-nr[a], -nr[a], fr[a], fr[a])),
+                    offset: std::array::from_fn(|a| _mm_setr_ps(-ns[a], -ns[a], fs[a], fs[a])),
+                    order: std::array::from_fn(|a| {
+                        if ray.negative[a] == 1 {
+                            _mm_setr_epi32(2, 3, 0, 1)
+                        } else {
+                            _mm_setr_epi32(0, 1, 2, 3)
+                        }
+                    }),
+                };
+            }
             Ray {
-                scale2: std::array::from_fn(|a| _mm_setr_ps(-nr[a], -nr[a], fr[a], fr[a])),
-                offset2: std::array::from_fn(|a| _mm_setr_ps(-ns[a], -ns[a], fs[a], fs[a])),
-                order2: std::array::from_fn(|a| {
-                    if ray.negative[a] == 1 {
-                        _mm_setr_epi32(2, 3, 0, 1)
-                    } else {
-                        _mm_setr_epi32(0, 1, 2, 3)
-                    }
-                }),
+                two,
                 t_min: ray.ray.t_min,
                 near_reciprocal: eight(nr),
                 near_shift: eight(ns),
@@ -90,8 +106,8 @@ impl Kernel for Avx2 {
             let ends = _mm_setr_ps(-ray.t_min, -ray.t_min, t_max, t_max);
             let [x, y, z] = std::array::from_fn(|a| {
                 let planes = _mm_load_ps(node.bounds[a].as_ptr());
-                let planes = _mm_permutevar_ps(planes, ray.order2[a]);
-                _mm_fmadd_ps(planes, ray.scale2[a], ray.offset2[a])
+                let planes = _mm_permutevar_ps(planes, ray.two.order[a]);
+                _mm_fmadd_ps(planes, ray.two.scale[a], ray.two.offset[a])
             });
             let m = _mm_min_ps(_mm_min_ps(x, y), _mm_min_ps(z, ends));
             // Exit minus entry: a negative sign means a miss.

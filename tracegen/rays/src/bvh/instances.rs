@@ -11,7 +11,7 @@ use super::count::Counter;
 use super::kernel::{Ends, Kernel};
 use super::leaf::{AnyHit, Closest, LeafTest, Place};
 use super::node::{BLOCK, Block, Child, MASKED};
-use super::traverse::{Width, walk};
+use super::traverse::{Two, Width, walk};
 use super::{Bvh, BvhError, TreeOptions};
 use crate::ray::{LARGEST_COORDINATE, PreparedRay, Ray};
 use formats::raytrace::TraversalKind;
@@ -554,7 +554,7 @@ impl<'a, K: Kernel, W: Width, L: LeafTest<K> + Search<'a, K>> LeafTest<K> for En
         }
         let pad = instance.pad(self.prepared.pad);
         let prepared = PreparedRay::with_pad(&ray, tree.bvh.bounds, pad);
-        let loaded = K::load(&prepared);
+        let loaded = K::load(&prepared, W::NUMBER == Two::NUMBER);
         let place = Moved {
             world: self.world,
             instance,

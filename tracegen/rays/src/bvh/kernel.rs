@@ -13,8 +13,8 @@ use crate::ray::PreparedRay;
 pub trait Kernel: Copy + Sized {
     /// The kernel's data of a ray.
     type Ray<'a>: Copy;
-    /// Prepares a ray for the kernel.
-    fn load<'a>(ray: &PreparedRay<'a>) -> Self::Ray<'a>;
+    /// Prepares a ray for the kernel; [`Self::step2`] needs `for_step2`.
+    fn load<'a>(ray: &PreparedRay<'a>, for_step2: bool) -> Self::Ray<'a>;
     /// The two-box test: minus the entry distances, and a bit for each child that is hit before
     /// `t_max`. With negated entries, one minimum serves entries and exits.
     fn step2(ray: &Self::Ray<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32);
@@ -60,7 +60,7 @@ pub struct Scalar;
 impl Kernel for Scalar {
     type Ray<'a> = PreparedRay<'a>;
 
-    fn load<'a>(ray: &PreparedRay<'a>) -> PreparedRay<'a> {
+    fn load<'a>(ray: &PreparedRay<'a>, _: bool) -> PreparedRay<'a> {
         *ray
     }
 
@@ -139,7 +139,7 @@ impl<const INNER_FIRST: bool> NodeOrder<INNER_FIRST> {
 impl<const INNER_FIRST: bool> Kernel for NodeOrder<INNER_FIRST> {
     type Ray<'a> = PreparedRay<'a>;
 
-    fn load<'a>(ray: &PreparedRay<'a>) -> PreparedRay<'a> {
+    fn load<'a>(ray: &PreparedRay<'a>, _: bool) -> PreparedRay<'a> {
         *ray
     }
 

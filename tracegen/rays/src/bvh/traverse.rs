@@ -308,7 +308,7 @@ pub(super) fn search<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter, A: Al
     alpha: &A,
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
-    let loaded = K::load(&prepared);
+    let loaded = K::load(&prepared, W::NUMBER == Two::NUMBER);
     let query = Query {
         bvh,
         first_slots: W::first_slots(bvh),
@@ -340,7 +340,7 @@ pub(super) fn search_below<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter>
     alpha: &dyn AlphaTest,
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
-    let loaded = K::load(&prepared);
+    let loaded = K::load(&prepared, W::NUMBER == Two::NUMBER);
     let query = Query {
         bvh,
         first_slots: W::first_slots(bvh),
