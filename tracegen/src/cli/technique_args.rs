@@ -63,7 +63,7 @@ pub struct TechniqueArgs {
     reuse_shading: Option<f32>,
     /// Disparity of highlights and mirrored light, as a share of that of the eyes' positions: 0 shows both eyes what the
     /// point between them sees.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
     highlight_disparity: Option<f32>,
     /// Draw everything beyond a distance once for both eyes. The distance is given in metres (7.5), as the
     /// largest error in pixels (1px), or as the distance of least cost within an error (least-work:2px;
