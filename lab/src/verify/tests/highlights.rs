@@ -1,7 +1,7 @@
 //! Where highlights are seen from.
 
 use super::*;
-use glam::{DMat4, DVec3, Mat4};
+use glam::Mat4;
 use scene::Light;
 
 const WALL_M: f32 = 0.4;
@@ -53,15 +53,14 @@ fn highlights_have_the_disparity_that_was_asked_for_and_the_trace_stays() {
         };
         let planner = planner(&settings, SIZE_PX, BOTH);
         let captured = capture_as(&planner, &scene, 0, BUDGET, true).unwrap();
-        let between = DVec3::from(
-            (Vec3::from(eyes[0].position) + Vec3::from(eyes[1].position)).as_dvec3() / 2.0,
-        );
-        for (eye, picture) in eyes.iter().zip(&captured.pictures) {
-            let eye_m = Vec3::from(eye.position).as_dvec3();
+        let positions = eyes.map(|eye| Vec3::from(eye.position).as_dvec3());
+        let between = (positions[0] + positions[1]) / 2.0;
+        let seen = eyes.iter().zip(positions).zip(&captured.pictures);
+        for ((eye, eye_m), picture) in seen {
             let seen_from = between + f64::from(share) * (eye_m - between);
             let on_wall = seen_from.with_z(f64::from(-WALL_M));
             let [projection, pose] = [eye.eye_to_clip, eye.world_to_eye]
-                .map(|m| -> DMat4 { Mat4::from_cols_array_2d(&m).as_dmat4() });
+                .map(|m| Mat4::from_cols_array_2d(&m).as_dmat4());
             let ndc = (projection * pose).project_point3(on_wall).truncate();
             let expected = (0.5 * ndc.x + 0.5) * f64::from(SIZE_PX[0]);
             let found = brightest_px(picture);

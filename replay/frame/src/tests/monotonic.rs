@@ -1,8 +1,8 @@
-//! More of a resource does not make a frame slower by more than 2 %, as long as it does not change what the caches hold.
-//! Few machines are above 1 %: requests that come earlier may delay others, and the last tiles of cores differ.
+//! More of a resource does not make a frame slower by more than 4 %, as long as it does not change what the caches hold, and
+//! rarely by more than 1 %: requests that come earlier may delay others, and the last tiles of cores differ.
 
 use super::*;
-use proptest::test_runner::RngSeed;
+use proptest::test_runner::{RngSeed, TestRunner};
 use std::sync::Mutex;
 
 /// Tiles of warps that read neighbouring lines, each line by two warps or more.
@@ -77,27 +77,48 @@ fn slower(machine: &Machine, seed: u64, more: impl Fn(&mut Machine)) -> f64 {
     100.0 * (work(&richer) / before - 1.0)
 }
 
-static WORST: Mutex<[f64; 4]> = Mutex::new([f64::MIN; 4]);
-
-proptest! {
-    #![proptest_config(ProptestConfig { max_shrink_iters: 0, rng_seed: RngSeed::Fixed(1), ..cases(16) })]
-
-    #[test]
-    fn more_of_a_resource_costs_at_most_two_percent((machine, seed) in roomy()) {
+#[test]
+fn more_of_a_resource_costs_at_most_four_percent_and_rarely_one() {
+    let config = ProptestConfig {
+        max_shrink_iters: 0,
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..cases(16)
+    };
+    let all = Mutex::new(Vec::new());
+    let compared = TestRunner::new(config).run(&roomy(), |(machine, seed)| {
         let bandwidth = slower(&machine, seed, |m| {
-            let DramMachine::Rate { ticks_per_line, .. } = &mut m.dram else { unreachable!() };
+            let DramMachine::Rate { ticks_per_line, .. } = &mut m.dram else {
+                unreachable!()
+            };
             *ticks_per_line = *ticks_per_line * 4 / 5;
         });
         let warps = slower(&machine, seed, |m| m.warps += 1 + m.warps / 4);
         let l1_mshrs = slower(&machine, seed, |m| m.l1_mshrs += 1 + m.l1_mshrs / 4);
         let l2_mshrs = slower(&machine, seed, |m| m.l2_mshrs += 1 + m.l2_mshrs / 4);
         let found = [bandwidth, warps, l1_mshrs, l2_mshrs];
-        let mut worst = WORST.lock().unwrap();
-        let is_worse = found.iter().zip(&*worst).any(|(found, worst)| found > worst);
-        worst.iter_mut().zip(found).for_each(|(worst, found)| *worst = worst.max(found));
-        if is_worse {
-            println!("slower by at most, %: bandwidth, warps, MSHRs of the L1, of the L2: {worst:.3?}");
-        }
-        prop_assert!(found.iter().all(|slower| *slower <= 2.0), "{:?} {:?}", found, machine);
+        all.lock().unwrap().push(found);
+        prop_assert!(
+            found.iter().all(|slower| *slower <= 4.0),
+            "{:?} {:?}",
+            found,
+            machine
+        );
+        Ok(())
+    });
+    compared.unwrap();
+    let all = all.into_inner().unwrap();
+    let names = ["bandwidth", "warps", "MSHRs of the L1", "MSHRs of the L2"];
+    let mut above = 0;
+    for (at, name) in names.iter().enumerate() {
+        let of = all.iter().map(|found| found[at]);
+        let above_one = of.clone().filter(|slower| *slower > 1.0).count();
+        let worst = of.fold(f64::MIN, f64::max);
+        println!(
+            "{name}: slower by {worst:.2} % at most; {above_one} of {} above 1 %",
+            all.len()
+        );
+        above += above_one;
     }
+    assert!(50 * above <= 4 * all.len(), "{above} above 1 %");
 }
