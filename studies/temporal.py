@@ -40,8 +40,23 @@ def run(study):
                 rows = [row for row in every if row["scheme"] == scheme]
                 figures = [f"{average(float(row[key]) for row in rows):.{digits}f}" for key, (digits, average) in FIGURES.items()]
                 worst = max(float(row[f"{eye}_flip_mean"]) for row in rows for eye in ("left", "right"))
-                first = scheme == "stereo"
-                table.append([rule if first and scene == SCENES[0] else "", scene if first else "", scheme, *figures, f"{worst:.4f}"])
+                table.append([rule, scene, scheme, *figures, f"{worst:.4f}"])
     study.write(
         "temporal", f"tracegen rays SCENE --size {size} --visits --path head --fps 90 --frame K, replay temporal",
         "rule | scene | scheme | left reused % | right reused % | performance | energy | DRAM MB | of G-buffers MB | left FLIP | right FLIP | worst FLIP", table)
+    study.write("temporal-summary", "", SUMMARY, summary(table), f"{len(SCENES)} scenes: geometric mean over all pairs of frames, least and most of a scene")
+
+
+SUMMARY = "rule | scheme | performance | performance, least to most | energy | energy, least to most | worst FLIP"
+
+
+def summary(table):
+    """Of each rule and scheme: means, and the spread over the scenes."""
+    rows = []
+    for rule in RULES:
+        for scheme in ("stereo", "temporal", "both"):
+            of = {row[1]: row for row in table if (row[0], row[2]) == (rule, scheme)}
+            mean_of = of.pop("all")
+            cells = [cell for at in (5, 6) for cell in (mean_of[at], " to ".join(pick((row[at] for row in of.values()), key=float) for pick in (min, max)))]
+            rows.append([rule, scheme, *cells, mean_of[-1]])
+    return rows
