@@ -1,8 +1,21 @@
-"""Frame time by scheduler on three machines, and against the bandwidth of DRAM, warps and FIFO depth: two frames of a head's path of four scenes."""
+"""Frame time by scheduler on three machines, and against the bandwidth of DRAM, warps and FIFO depth: two frames of a head's path of five scenes, and of three
+recorded programs.
+
+Programs are pages that the study `apps` installs.
+"""
 
 import math
 
-SCENES = ["jungle", "crytek-sponza", "stk-cocoa-temple", "stk-black-forest"]
+from .apps import install
+
+OPTIONS = {"--part": dict(choices=["machines", "bandwidth", "warps"], help="one of the three comparisons (all)")}
+SCENES = ["jungle", "crytek-sponza", "dabrovic-sponza", "stk-cocoa-temple", "stk-black-forest"]
+# Page and query of each program.
+PROGRAMS = {
+    "three.js": ("three.html", "?mode=stereo"),
+    "three.js, shadows": ("three.html", "?mode=stereo&shadows=1"),
+    "Babylon.js": ("babylon.html", "?mode=vr"),
+}
 BANDWIDTH_SCENES = ["jungle", "crytek-sponza", "stk-black-forest"]
 MACHINES = {
     "mali-g710": "--preset mali-g710",
@@ -51,12 +64,24 @@ def against_warps(study, traces):
         f"scene | warps | FIFO, quads | first-idle, ms | first-idle: waits for lines % | {' | '.join(f'{name}, % faster' for name in WARPS_SCHEDULERS)}", table)
 
 
-def run(study):
-    present = study.present(SCENES)
-    traces = {scene: study.raster(scene, "--size 480x540 --path head --frames 2") for scene in present}
-    table, papers, bandwidths = [], [], []
+def recorded(study):
+    """Traces of the programs."""
+    site, traces = study.out / "site", {}
+    install(site)
+    for name, (page, query) in PROGRAMS.items():
+        trace = study.traces / f"{page}{query.replace('?', '-').replace('&', '-')}.textrace"
+        if not trace.exists():
+            trace.parent.mkdir(parents=True, exist_ok=True)
+            study.tracegen("page", page, "--query", query, "--frames 10..12 --quiet -o", trace.resolve(), folder=site)
+        traces[name] = trace
+    return traces
+
+
+def by_machine(study, traces):
+    """Every scheduler on every machine, and the papers' gains."""
+    table, papers = [], []
     for machine, flags in MACHINES.items():
-        rows = [row for scene in present for row in study.csv("schedule", traces[scene], flags)]
+        rows = [row for trace in traces.values() for row in study.csv("schedule", trace, flags)]
         study.say(machine)
         named = {}
         for row in rows:
@@ -75,6 +100,16 @@ def run(study):
             look_ups = mean([float(row["l2_look_ups_m"]) / float(before["l2_look_ups_m"]) for row, before in pairs])
             latency = mean([float(row["latency_cycles"]) / float(before["latency_cycles"]) for row, before in pairs])
             papers.append([paper, f"{ours} over {over}", published, machine, f"{speed:+.1f}", f"{look_ups:+.1f}", f"{latency:+.1f}"])
+    detail = f"{CAPTURE}, tracegen page PAGE --frames 10..12, replay schedule TRACE {' | '.join(MACHINES.values())}"
+    study.write(
+        "schedule", detail, f"machine | scheduler | {' | '.join(f'{scene}, % faster' for scene in traces)} | mean, % faster | half to twice the instructions | "
+        "DRAM bytes saved % | above the bound % | bits", table)
+    study.write("schedule-papers", detail, "paper | ours | published, % faster | machine | ours, % faster | L2 look-ups % | latency of DRAM %", papers)
+
+
+def against_bandwidth(study, traces):
+    """Frame time against the bandwidth of DRAM."""
+    bandwidths = []
     for scene in study.present(BANDWIDTH_SCENES):
         rows = study.csv("schedule", traces[scene], "--bandwidth", BANDWIDTHS, "--schedulers", ",".join(SCHEDULERS))
         study.say(scene)
@@ -85,15 +120,15 @@ def run(study):
             bytes_all, bytes_sta = ([float(of(name)[key]) for key in ("read_mb", "written_mb")] for name in ("first-idle", "z2-sta"))
             bandwidths.append([scene, bandwidth, f"{float(first['ms']):.2f}", f"{float(first['bound_ms']):.2f}", *(spread(of(name)) for name in SCHEDULERS),
                                f"{100 * (1 - sum(bytes_sta) / sum(bytes_all)):.1f}"])
-    against_warps(study, traces)
-    study.drop(*traces.values())
-    study.write(
-        "schedule", f"{CAPTURE}, replay schedule TRACE {' | '.join(MACHINES.values())}",
-        f"machine | scheduler | {' | '.join(f'{scene}, % faster' for scene in present)} | mean, % faster | half to twice the instructions | DRAM bytes saved % | "
-        "above the bound % | bits", table)
-    study.write(
-        "schedule-papers", f"{CAPTURE}, replay schedule TRACE {' | '.join(MACHINES.values())}",
-        "paper | ours | published, % faster | machine | ours, % faster | L2 look-ups % | latency of DRAM %", papers)
     study.write(
         "schedule-bandwidth", f"{CAPTURE}, replay schedule TRACE --bandwidth {BANDWIDTHS} --schedulers {','.join(SCHEDULERS)}",
         f"scene | GB/s | first-idle, ms | bound, ms | {' | '.join(f'{name}, % faster' for name in SCHEDULERS)} | z2-sta: DRAM bytes saved %", bandwidths)
+
+
+def run(study):
+    scenes = {scene: study.raster(scene, "--size 480x540 --path head --frames 2") for scene in study.present(SCENES)}
+    parts = {"machines": lambda: by_machine(study, scenes | recorded(study)), "bandwidth": lambda: against_bandwidth(study, scenes),
+             "warps": lambda: against_warps(study, scenes)}
+    for part in [study.options.part] if study.options.part else parts:
+        parts[part]()
+    study.drop(*scenes.values())
