@@ -44,7 +44,7 @@ def run(study):
     study.write("disparity-ipd", f"{detail} --ipd MM; replay paper --csv, L1 of 16 KiB and L2 of 256 KiB", "scene | IPD mm | LRTA saves % | STA saves %", by_distance)
     study.write("disparity-highlights", f"{detail} --highlight-disparity SHARE", "scene | shares | different traces", by_share, "shares " + ", ".join(SHARES))
     study.write("disparity-techniques", f"tracegen techniques SCENE --path head --frames 2 --repeats 1 --size {SIZE} --only LIST -o DIR; replay techniques DIR --json",
-                "scene | technique | fragments % | FLIP, mean | FLIP, worst | STA saves without % | STA saves with % ", techniques)
+                "scene | technique | fragments % | FLIP, mean | FLIP, worst | STA saves without % | STA saves with %", techniques)
     means = []
     for ipd in IPDS_MM:
         rows = [row for row in by_distance if row[1] == ipd]

@@ -1,5 +1,5 @@
-//! More of a resource does not make a frame slower by more than 4 %, as long as it does not change what the caches hold, and
-//! rarely by more than 1 %: requests that come earlier may delay others, and the last tiles of cores differ.
+//! On these machines and tiles, more of a resource makes no frame slower by more than 4 %, and rarely one by more than 1 %:
+//! requests that come earlier may delay others, and the last tiles of cores differ. Caches hold all lines.
 
 use super::*;
 use proptest::test_runner::{RngSeed, TestRunner};
