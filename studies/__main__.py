@@ -16,7 +16,7 @@ OUT = os.environ.get("OUT", "out")
 def listed():
     """Each study's name, and what its module says about it."""
     for path in sorted(Path(__file__).parent.glob("*.py")):
-        if path.stem not in ("__init__", "__main__", "common", "size_histograms"):
+        if path.stem not in ("__init__", "__main__", "common"):
             yield path.stem.replace("_", "-"), ast.get_docstring(ast.parse(path.read_text()))
 
 

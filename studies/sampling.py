@@ -9,7 +9,8 @@ from pathlib import Path
 from .common import machine, mean
 
 OPTIONS = {
-    "--size": dict(default="240x270", help="pixels per eye (240x270)"),
+    "--size": dict(default="960x1080", help="pixels per eye (960x1080)"),
+    "--caches": dict(default="8/64,8/128,16/256,16/512", help="L1/L2 KiB of the machines (8/64,8/128,16/256,16/512)"),
     "--frames": dict(type=int, default=60, help="frames of each path (60)"),
     "--draws": dict(type=int, default=400, help="samples of each population (400)"),
     "--within": dict(default="1points", help="largest half width (1points)"),
@@ -22,8 +23,6 @@ SCENES = [
     "atrium", "jungle", "plant", "meadow", "lab", "music-box",
 ]
 ORDERS = "z2-lrta,z2-sta,zig-zag+sta+offset"
-# At a quarter of the width of a display an L2 of 16 to 128 KiB is as far from holding a frame as one of 64 to 512 KiB at full width.
-CACHES = "4/16,8/32,8/64,16/128"
 
 
 def cut_path(path, frames):
@@ -52,7 +51,7 @@ def population(study, folder, scene, path):
         whole = study.work / "all.textrace"
         captured = study.tracegen(*words, "--no-plain", "-o", whole)
         replayed = study.replay(
-            "sample", study.work / "plan.textrace", whole, "--quiet --orders", ORDERS, "--caches", CACHES, "--save-values", values, "--draws 1")
+            "sample", study.work / "plan.textrace", whole, "--quiet --orders", ORDERS, "--caches", study.options.caches, "--save-values", values, "--draws 1")
         whole.unlink()
         shutil.copy(study.work / "plan.textrace", plan)
         costs.write_text(json.dumps({key: one.processor_s for key, one in [("plan", planned), ("capture", captured), ("replay", replayed)]}))
@@ -132,7 +131,7 @@ def run(study):
     populations = {(scene, path): population(study, folder, scene, path) for path in paths for scene in scenes}
     for (scene, path), (plan, values, cost) in sorted(populations.items(), key=lambda item: (scenes.index(item[0][0]), item[0][1])):
         trials = study.csv(
-            "sample", plan, "--values", values, "--orders", ORDERS, "--caches", CACHES, "--draws", options.draws, "--within", options.within)
+            "sample", plan, "--values", values, "--orders", ORDERS, "--caches", options.caches, "--draws", options.draws, "--within", options.within)
         for trial in trials:
             figure = {key: float(trial[key]) for key in trial if key not in ("caches", "order", "figure")}
             width = figure["mean_half"] / figure["known_half"] if figure["known_half"] else 1.0

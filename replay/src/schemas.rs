@@ -5,8 +5,8 @@ use crate::cli;
 use formats::schemas::{Published, assert_published};
 use report::document::published;
 use report::{
-    accuracy, addresses, calibration, compare, locality, orders, readings, run, sample, schedule,
-    sgrt, sweep, sweep_plan, techniques, temporal, z2,
+    accuracy, addresses, calibration, compare, locality, orders, predict, readings, run, sample,
+    schedule, sgrt, sweep, sweep_plan, techniques, temporal, z2,
 };
 use std::path::Path;
 use studies::experiment;
@@ -26,6 +26,7 @@ fn all() -> Vec<Published> {
         published::<orders::OrdersReport, orders::OrdersJson>(),
         published::<sample::SampleReport, sample::SampleJson>(),
         published::<sample::TrialReport, sample::TrialJson>(),
+        published::<predict::PredictReport, predict::PredictJson>(),
         published::<schedule::ScheduleReport, schedule::ScheduleJson>(),
         published::<techniques::TechniquesReport, techniques::TechniquesJson>(),
         published::<accuracy::AccuracyReport, accuracy::AccuracyJson>(),

@@ -428,6 +428,7 @@ fn every_command_prints_what_its_trace_lacks() {
     let others = [
         "completions",
         "man",
+        "predict",
         "readings",
         "reproject",
         "sample",

@@ -41,6 +41,7 @@ mod orders;
 mod outputs;
 mod pages;
 mod paths;
+mod predicted;
 mod programs;
 mod python;
 mod raster;

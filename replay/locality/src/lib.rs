@@ -5,8 +5,10 @@
 //! figure.
 
 mod axis;
+mod caches;
 mod distances;
 mod figures;
+mod growth;
 mod knees;
 mod last_use;
 mod opt;
@@ -17,12 +19,14 @@ mod plain;
 mod profile;
 mod set_associative;
 mod split;
+mod stretch;
 #[cfg(test)]
 mod tests;
 mod working_set;
 
 pub use distances::{DistanceBin, Distances};
 pub use figures::Figures;
+pub use growth::distinct_lines;
 pub use knees::Rows;
 pub use optimal::{OptMisses, opt_misses};
 pub use orders::{OrderFigures, Sequence, Stream, Streams, analyse};
@@ -31,4 +35,5 @@ pub use plain::analyse_addresses;
 pub use profile::{Profile, StreamCache};
 pub use set_associative::CacheHits;
 pub use split::MissSplit;
+pub use stretch::Reuses;
 pub use working_set::WorkingSet;

@@ -55,6 +55,8 @@ pub enum Streams {
     WithMerged,
     /// That of the L2, which takes a fraction of the time.
     OnlyL2,
+    /// Distances and first uses of that of the L2, without caches that receive it.
+    OnlyL2Distances,
 }
 
 /// The order of the accesses.
@@ -301,12 +303,16 @@ impl Analysis {
     fn new(config: &RunConfig, streams: Streams) -> Result<Self, ConfigError> {
         // The seeds of a replay.
         let profile = |level: &'static str, cache: &LevelConfig, number: u32| {
-            Profile::new(StreamCache {
+            let of = StreamCache {
                 cache: *cache,
                 level,
                 line_bytes: config.line_bytes,
                 seed: config.seed.wrapping_add(number.into()),
-            })
+            };
+            match streams {
+                Streams::OnlyL2Distances => Profile::of_distances(of),
+                _ => Profile::new(of),
+            }
         };
         let shared = |profile| Shared {
             profile,
@@ -318,7 +324,9 @@ impl Analysis {
         };
         let core = |number| {
             let l1 = match streams {
-                Streams::OnlyL2 => FirstLevel::Plain(plain(number)?.into_box()),
+                Streams::OnlyL2 | Streams::OnlyL2Distances => {
+                    FirstLevel::Plain(plain(number)?.into_box())
+                }
                 Streams::Levels | Streams::WithMerged => {
                     FirstLevel::Analysed(Box::new(profile("L1", &config.level.l1, number)?))
                 }

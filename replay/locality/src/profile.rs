@@ -6,17 +6,14 @@
 //! depends only on the number of distinct lines.
 
 use crate::axis::{CountedTimes, Renumbering};
+use crate::caches::Caches;
 use crate::distances::Distances;
 use crate::figures::Figures;
 use crate::knees::{NO_ROW, RowCounts};
 use crate::last_use::{LastUses, NEVER, Span};
-use crate::opt;
-use crate::place::{ByOrigin, Origin, Place, TileOfEye, add};
-use crate::set_associative::{CacheHits, SetAssociative};
-use crate::split::MissSplit;
+use crate::place::{ByOrigin, Origin, Place, TileOfEye};
 use crate::working_set::WorkingSets;
 use sim::config::{ConfigError, LevelConfig, RunConfig, accept};
-use sim::memory::{AnyCache, Cache};
 
 /// The cache that receives a stream.
 #[derive(Clone, Copy, Debug)]
@@ -30,12 +27,6 @@ pub struct StreamCache {
     /// Seed of random replacement.
     pub seed: u64,
 }
-
-/// Associativities in the curves.
-const WAYS: [u32; 5] = [1, 2, 4, 8, 16];
-
-/// Sizes in the curves: from 1/8 to 16 times the configured size, as powers of two.
-const SIZES: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Upper limit for the lines of all caches. The caches of the curves, up to sixteen times as large and of
 /// several associativities, then take about 800 MiB.
@@ -63,9 +54,10 @@ const FIRST_AXIS: u32 = 1 << 16;
 /// An analysis in progress. Set the place with [`Self::at`], then add every line looked up there.
 pub struct Profile {
     of: StreamCache,
-    cache: Box<dyn Cache>,
     /// Capacity of the cache in lines.
     lines: u32,
+    /// Absent if only distances are asked for.
+    caches: Option<Box<Caches>>,
 
     here: TileOfEye,
     /// Row of the tile, or [`NO_ROW`].
@@ -92,10 +84,7 @@ pub struct Profile {
     distances: Distances,
     /// Immediate reuses.
     at_once: ByOrigin,
-    split: MissSplit,
-    lru: SetAssociative,
-    opt: Vec<opt::FullyAssociative>,
-    opt_of_geometry: opt::OptSets,
+    first_uses: u64,
     working_sets: WorkingSets,
     frame_lines: u64,
     frame_lines_of_both_eyes: u64,
@@ -104,7 +93,7 @@ pub struct Profile {
 
 impl Profile {
     /// Largest size in the curves over the configured size rounded up to a power of two.
-    pub(crate) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
+    pub(crate) const LARGEST_OVER_CONFIGURED: u64 = Caches::LARGEST_OVER_CONFIGURED;
 
     /// An empty analysis.
     ///
@@ -116,32 +105,26 @@ impl Profile {
 
     /// An analysis whose first axis has this length, a multiple of 64.
     pub(crate) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
-        let sets = of.cache.sets(of.level, of.line_bytes)?;
-        let ways = of.cache.ways;
-        let lines = sets * ways;
-        let mut sizes: Vec<u32> = SIZES
-            .filter_map(|power| match power {
-                0.. => lines.next_power_of_two().checked_shl(power as u32),
-                _ => Some(lines.next_power_of_two() >> -power),
-            })
-            .filter(|&size| size > 0)
-            .chain([lines])
-            .collect();
-        sizes.sort_unstable();
-        sizes.dedup();
-        let geometry = |size: u32, ways: u32| {
-            let fits = size.is_multiple_of(ways) && (size / ways).is_power_of_two();
-            fits.then(|| (size / ways, ways))
-        };
-        let of_sizes = sizes.iter().flat_map(|&size| {
-            let all = WAYS.into_iter().chain([ways]);
-            all.filter_map(move |ways| geometry(size, ways))
-        });
-        let opt = sizes.iter();
+        Ok(Self {
+            caches: Some(Box::new(Caches::new(&of, times)?)),
+            ..Self::without_caches(of, times)?
+        })
+    }
+
+    /// An analysis of distances and first uses alone, which takes a third of the time.
+    ///
+    /// # Errors
+    /// An impossible cache.
+    pub(crate) fn of_distances(of: StreamCache) -> Result<Self, ConfigError> {
+        Self::without_caches(of, FIRST_AXIS)
+    }
+
+    fn without_caches(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
+        let lines = of.cache.sets(of.level, of.line_bytes)? * of.cache.ways;
         Ok(Self {
             of,
-            cache: AnyCache::build(&of.cache, of.level, of.line_bytes, of.seed)?.into_box(),
             lines,
+            caches: None,
             here: TileOfEye::NONE,
             row: NO_ROW,
             item: None,
@@ -158,12 +141,7 @@ impl Profile {
             rows: RowCounts::default(),
             distances: Distances::default(),
             at_once: ByOrigin::default(),
-            split: MissSplit::default(),
-            lru: SetAssociative::new(of_sizes.chain([(sets, ways)]).collect()),
-            opt: opt
-                .map(|&size| opt::FullyAssociative::new(size, times))
-                .collect(),
-            opt_of_geometry: opt::OptSets::new(sets, ways),
+            first_uses: 0,
             working_sets: WorkingSets::default(),
             frame_lines: 0,
             frame_lines_of_both_eyes: 0,
@@ -177,11 +155,14 @@ impl Profile {
     /// # Errors
     /// An impossible cache.
     pub fn flush(&mut self) -> Result<Figures, ConfigError> {
-        let next = Self::with_axis(self.of, self.times)?;
-        let mut last = std::mem::replace(self, next);
-        std::mem::swap(&mut self.cache, &mut last.cache);
-        self.cache.clear();
-        Ok(last.finish())
+        let mut next = Self::without_caches(self.of, self.times)?;
+        if let Some(caches) = &mut self.caches {
+            let mut empty = Caches::new(&self.of, self.times)?;
+            std::mem::swap(&mut empty.configured, &mut caches.configured);
+            empty.configured.clear();
+            next.caches = Some(Box::new(empty));
+        }
+        Ok(std::mem::replace(self, next).finish())
     }
 
     /// Starts a frame. Caches keep their lines.
@@ -196,7 +177,9 @@ impl Profile {
     /// Sets the place of the following look-ups.
     pub fn at(&mut self, place: &Place) {
         self.here = TileOfEye::of(place);
-        self.row = place.row.unwrap_or(NO_ROW);
+        // Rows are not asked for with distances alone.
+        let row = place.row.filter(|_| self.caches.is_some());
+        self.row = row.unwrap_or(NO_ROW);
         self.frames += u64::from(!self.is_frame_counted);
         self.is_frame_counted = true;
         if self.item.is_none_or(|item| place.item > item) {
@@ -206,12 +189,15 @@ impl Profile {
         }
     }
 
-    /// Looks up a line in all caches, and fills it on a miss. Returns true for a hit in the configured cache.
+    /// Looks up a line in all caches, and fills it on a miss. Returns true for a hit in the configured cache; false
+    /// without caches.
     pub fn access(&mut self, line: u32) -> bool {
         if self.now == self.times {
             self.renumber();
         }
-        let hit = self.cache.access(line);
+        let mut caches = self.caches.as_deref_mut();
+        let configured = caches.as_mut().map(|caches| &mut caches.configured);
+        let hit = configured.is_some_and(|cache| cache.access(line));
         let last = self.uses.of(line);
         let (before, place_before, row_before) = (last.time, last.place, last.row);
         (last.place, last.row) = (self.here, self.row);
@@ -237,9 +223,10 @@ impl Profile {
         if before == NEVER {
             last.time = now;
             self.last_times.insert(now);
-            self.lru.access(line, None);
-            self.opt_of_geometry.access(line, None, now);
-            self.split.compulsory += 1;
+            self.first_uses += 1;
+            if let Some(caches) = caches {
+                caches.first_use(line, now);
+            }
             self.now += 1;
             return hit;
         }
@@ -257,14 +244,10 @@ impl Profile {
         if is_from_row {
             self.rows.reuse(distance);
         }
-        self.split.count(origin, hit, distance < self.lines);
-        self.lru.access(line, Some(origin));
-        for opt in &mut self.opt {
-            let kept = before + 1 == now || opt.reuse(before, now);
-            opt.hits[origin] += u64::from(kept);
+        if let Some(caches) = caches {
+            let hits = [hit, distance < self.lines];
+            caches.reuse(line, origin, [before, now], hits);
         }
-        let kept = self.opt_of_geometry.access(line, Some(before), now);
-        self.opt_of_geometry.hits[origin] += u64::from(kept);
         self.now += 1;
         hit
     }
@@ -272,15 +255,14 @@ impl Profile {
     /// Removes all times from the axis that are no longer referenced.
     #[cold]
     fn renumber(&mut self) {
-        let opt_times = self.opt.iter().map(opt::FullyAssociative::times);
+        let opt_times = self.caches.iter().flat_map(|caches| caches.opt_times());
         let numbers = Renumbering::new(&self.last_times, opt_times);
         let room = (u64::from(numbers.len()) * 4).next_power_of_two();
         let times = u32::try_from(room).unwrap_or(NEVER).max(self.times);
         self.last_times = self.last_times.renumbered(&numbers, times);
-        for opt in &mut self.opt {
-            opt.renumber(&numbers, times);
+        if let Some(caches) = &mut self.caches {
+            caches.renumber(&numbers, times);
         }
-        self.opt_of_geometry.renumber(&numbers);
         for line in self.uses.used() {
             line.time = numbers.of(line.time);
         }
@@ -297,39 +279,22 @@ impl Profile {
         for (origin, &times) in self.at_once.iter().enumerate() {
             distances.count(0, origin, times);
         }
-        let mut split = self.split;
-        add(&mut split.hits_of_both, &self.at_once);
         let reuses: u64 = distances.total().iter().sum();
-        let with_front = |hits: &ByOrigin| {
-            let mut hits = *hits;
-            add(&mut hits, &self.at_once);
-            hits
-        };
-        let opt = self.opt.iter().map(|opt| CacheHits {
-            lines: opt.lines.into(),
-            ways: None,
-            hits: with_front(&opt.hits),
-        });
-        let lru = self.lru.hits().into_iter().map(|cache| CacheHits {
-            hits: with_front(&cache.hits),
-            ..cache
-        });
+        let figures =
+            (self.caches).map_or_else(Figures::default, |caches| caches.figures(&self.at_once));
         Figures {
-            accesses: split.compulsory + reuses,
-            unique_lines: split.compulsory,
+            accesses: self.first_uses + reuses,
+            unique_lines: self.first_uses,
             tiles: self.tiles.into(),
             frames: self.frames,
             rows: self.rows.finish(),
             frame_lines: self.frame_lines,
             frame_lines_of_both_eyes: self.frame_lines_of_both_eyes,
             frame_lines_of_earlier_frames: self.frame_lines_of_earlier_frames,
-            split,
-            lru: lru.collect(),
-            opt: opt.collect(),
             configured_lines: self.lines.into(),
-            opt_of_geometry: with_front(&self.opt_of_geometry.hits),
             working_sets: self.working_sets.curve(self.tiles),
             distances,
+            ..figures
         }
     }
 }

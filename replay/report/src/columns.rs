@@ -155,7 +155,9 @@ impl Show {
                 [figure.value, figure.low, figure.high].map(|x| self.write(&Value::Real(x)));
             return match figure.because {
                 Because::Exact => text,
-                Because::Sampling { .. } => format!("{text} ({low} to {high})"),
+                Because::Sampling { .. } | Because::Residuals { .. } => {
+                    format!("{text} ({low} to {high})")
+                }
                 Because::Bounds { .. } => format!("{text} [{low} to {high}]"),
             };
         }

@@ -19,6 +19,7 @@ pub mod orders;
 pub mod parquet;
 pub mod picture;
 pub mod plots;
+pub mod predict;
 pub mod readings;
 pub mod rows_parquet;
 pub mod run;

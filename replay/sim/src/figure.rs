@@ -12,7 +12,7 @@ pub struct Figure {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Probability that the ends enclose the true value; `None` unless the doubt is from sampling.
+    /// Probability that the ends enclose the true value; `None` for exact figures and for bounds.
     pub confidence: Option<f64>,
     /// Where the doubt is from.
     pub because: Because,
@@ -36,6 +36,13 @@ pub enum Because {
         /// Degrees of freedom of the estimated variance.
         degrees_of_freedom: f64,
     },
+    /// The ends are the value and the largest error on scenes whose values are known.
+    Residuals {
+        /// Number of scenes.
+        scenes: usize,
+        /// Number of their sources; scenes of one source share content.
+        sources: usize,
+    },
     /// The ends are the lowest and the highest value over this range.
     Bounds {
         /// The range, in words.
@@ -55,7 +62,7 @@ impl Figure {
         }
     }
 
-    /// An estimate from a random sample, plus or minus `half`.
+    /// An estimate, plus or minus `half`.
     pub fn sampled(value: f64, half: f64, confidence: f64, because: Because) -> Self {
         Self {
             value,
@@ -121,6 +128,9 @@ impl fmt::Display for Because {
                 f,
                 "{n} of {of} replayed: {method}, {degrees_of_freedom} degrees of freedom"
             ),
+            Self::Residuals { scenes, sources } => {
+                write!(f, "largest error on {scenes} scenes of {sources} sources")
+            }
             Self::Bounds { over } => write!(f, "lowest and highest over {over}"),
         }
     }

@@ -18,6 +18,7 @@ mod order_arg;
 mod orders;
 mod outputs;
 mod paper;
+mod predict;
 mod readings;
 mod report;
 pub mod reproject;
@@ -108,6 +109,9 @@ enum Command {
     /// Answer for a path from a sample of its frames, within a width that is asked for.
     #[command(mut_args(without(&["order", "l1", "l2", "details"])))]
     Sample(Box<sample::Args>),
+    /// Predict what orders save at a larger picture size than the captured one.
+    #[command(mut_args(without(&["order", "l1", "l2", "l3", "details", "mode", "prefetch", "dram", "frame"])))]
+    Predict(Box<predict::Args>),
     /// Model frame time by scheduler: shaders, texture units, caches and DRAM in a closed loop.
     #[command(mut_args(without(&["order", "mode", "l3", "assign", "between_frames", "prefetch", "frame", "count_by", "tmu", "memory_cycles", "loop_cycles", "tmu_threads", "retry_footprints", "fetches_per_trip", "allocation"])))]
     Schedule(Box<schedule::Args>),
@@ -182,6 +186,7 @@ impl Command {
             Self::Techniques(args) => techniques::run(&args),
             Self::Orders(args) => orders::run(&args),
             Self::Sample(args) => sample::run(&args),
+            Self::Predict(args) => predict::run(&args),
             Self::Schedule(args) => schedule::run(&args),
             Self::Locality(args) => locality::run(&args),
             Self::Reproject(args) => reproject::run(*args),
