@@ -1,13 +1,13 @@
 """What tile orders save by picture size, ways and L2, and how well the full size follows from smaller captures: docs/results/sizes.md.
 
-Parts: table, knees, predict, single, even-sets, machines; by default all of them, which takes hours. What a capture gives is kept in OUT/sizes, where a later run finds it.
+Parts: table, knees, predict, even-sets, machines; by default all of them, which takes hours. What a capture gives is kept in OUT/sizes, where a later run finds it.
 """
 
 import json
 import shutil
 import tomllib
 
-from .common import Failed, machine, mean, read_csv
+from .common import Failed, mean, read_csv
 from .orders import mean_change, one
 
 # Label, source, scene, camera. Scenes of one source share textures.
@@ -47,11 +47,6 @@ L2_KIB = [128, 512, 2048]
 WAYS = [4, 8, 16]
 HASHED = "16 ways, hashed"
 ORGANISATIONS = [*(f"{ways} ways" for ways in WAYS), HASHED]
-# A single frame at full size, and the parts of its width and height that predict it.
-WHOLE_PX = (1920, 2160)
-PARTS_OF_WHOLE = {"1/2": 2, "1/3": 3}
-
-
 def size_px(display, scale):
     return tuple(2 * round(side * SCALES[scale] / 2) for side in PANELS[display])
 
@@ -266,73 +261,6 @@ def predict(study):
         f"{2 * mean(half_width.values()):.1f}", f"{2 * max(half_width.values()):.1f}", len(cells), len(knee_errors), f"{max(error.values()):.1f}", f"{max(knee_errors, default=0):.1f}"]], part="predict")
 
 
-def timed_capture(study, camera, size):
-    """A capture without the caches of earlier captures, and its processor time."""
-    label, _, scene, name = camera
-    width, height = size
-    trace = study.work / f"{label}-{width}.textrace"
-    done = study.tracegen("raster", study.scene(scene), "--camera", name, "--hmd", MAIN, "--size", f"{width}x{height}", "--no-plain --quiet -o", trace)
-    return trace, done.processor_s
-
-
-def single(study):
-    """One frame at full size: processor time of everything and of predictions, and the errors of these."""
-    rows, totals = [], {}
-    for camera in CAMERAS:
-        def found():
-            # The first capture fills the cache of textures, which every later capture of a scene uses.
-            trace, _ = timed_capture(study, camera, WHOLE_PX)
-            trace.unlink()
-            whole, whole_s = timed_capture(study, camera, WHOLE_PX)
-            orders = ",".join(HASHED_ORDERS)
-            caches = ",".join(f"8/{kib}" for kib in L2_KIB)
-            replayed = study.replay(
-                "orders", whole, *organised(study, HASHED), "--mode functional --json --quiet --orders", orders, "--caches", caches)
-            truth = {f"{row['l2_kib']:.0f} {row['order']}": row["external_bytes"] for row in json.loads(replayed.out)["rows"]}
-            whole.unlink()
-            least, load_s = timed_capture(study, camera, (64, 72))
-            least.unlink()
-            parts = {}
-            for name, part in PARTS_OF_WHOLE.items():
-                trace, capture_s = timed_capture(study, camera, [side // part for side in WHOLE_PX])
-                words = ["predict", trace, "--to", "x".join(map(str, WHOLE_PX)), "--orders", ",".join(HASHED_ORDERS[1:]), "--caches", caches]
-                done = study.replay(*words, "--json --quiet")
-                cells = [[row["stretched_pct"], row["answer"].startswith("inside"), f"{row['caches'].split('/')[1]} {row['order']}"] for row in json.loads(done.out)["rows"]]
-                parts[name] = {"capture_s": capture_s, "predict_s": done.processor_s, "cells": cells}
-                trace.unlink()
-            return {"whole_s": whole_s, "replay_s": replayed.processor_s, "load_s": load_s, "truth": truth, "parts": parts}
-
-        of = stored(study, f"{camera[0]}-single", found)
-        everything = of["whole_s"] + of["replay_s"]
-        for name, part in of["parts"].items():
-            errors = {True: [], False: []}
-            for value, is_knee, cell in part["cells"]:
-                kib = cell.split()[0]
-                true = 100 * (1 - of["truth"][cell] / of["truth"][f"{kib} morton"])
-                errors[is_knee].append(abs(value - true))
-            ratio = (part["capture_s"] + part["predict_s"]) / everything
-            worst = {is_knee: max(of_cells, default=None) for is_knee, of_cells in errors.items()}
-            totals.setdefault(name, []).append((ratio, worst, errors))
-            rows.append([
-                camera[0], name, f"{of['whole_s']:.1f}", f"{of['replay_s']:.1f}", f"{of['load_s']:.1f}", f"{part['capture_s']:.1f}", f"{part['predict_s']:.1f}",
-                f"{ratio:.2f}", len(errors[True]), one(worst[False]), one(worst[True])])
-    detail = f"one frame of {'x'.join(map(str, WHOLE_PX))} per eye on {MAIN}; L2 of {', '.join(map(str, L2_KIB))} KiB, two orders"
-    study.write("sizes-single", f"{detail}; processor times",
-                "scene | capture, of the width | whole capture s | replay s | capture of 64x72 s | smaller capture s | predict s | time over everything | inside a knee, of 6 | largest error outside knees, points | largest error inside, points",
-                rows, machine(), part="single")
-    summary = []
-    for name, found in totals.items():
-        ratios = [ratio for ratio, *_ in found]
-        outside = [error for *_, errors in found for error in errors[False]]
-        inside = [error for *_, errors in found for error in errors[True]]
-        summary.append([
-            name, len(found), sum(ratio <= 1 / 3 for ratio in ratios), f"{min(ratios):.2f}", f"{max(ratios):.2f}", len(outside) + len(inside), len(inside),
-            sum(error <= 5 for error in outside + inside), one(max(outside)), one(max(inside))])
-    study.write("sizes-single-summary", detail,
-                "capture, of the width | scenes | at most a third of the time | least time over everything | most | cells | inside a knee | within 5 points | largest error outside knees, points | largest error inside, points",
-                summary, part="single")
-
-
 def even_sets(study):
     """The push through ways alone: reuses and traffic of the same size."""
     table = []
@@ -374,7 +302,7 @@ def machines(study):
                 f"machine | display | size | scenes | least bytes | {' % | '.join(order for order in MACHINE_ORDERS if order != 'z2-sta')} %", table, part="machines")
 
 
-PARTS = {"table": table, "knees": knees, "predict": predict, "single": single, "even-sets": even_sets, "machines": machines}
+PARTS = {"table": table, "knees": knees, "predict": predict, "even-sets": even_sets, "machines": machines}
 OPTIONS = {"parts": dict(nargs="*", metavar="PART", help=f"some of: {', '.join(PARTS)} (all)")}
 
 

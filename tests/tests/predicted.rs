@@ -109,7 +109,10 @@ fn a_prediction_comes_near_the_measured_saving() {
             &["--to", "960x1080", "--orders", "morton"],
             "expected an order other than the baseline",
         ),
-        (&["--to", "960x1080", "--l2", "8KiB"], "use --caches"),
+        (
+            &["--to", "960x1080", "--l2", "8KiB", "--caches", "8/128"],
+            "use --caches",
+        ),
     ] {
         let mut command = program("replay");
         refuse(command.arg("predict").arg(&half).args(flags), &[expected]);
@@ -118,11 +121,28 @@ fn a_prediction_comes_near_the_measured_saving() {
         "--to",
         "1920x2160",
         "--caches",
-        "8/2048",
+        "8/128",
     ]));
     let far = String::from_utf8_lossy(&far.stdout).into_owned();
     assert!(
         far.contains("no interval: more than three times the width"),
         "{far}"
+    );
+    // A preset has caches and lines of its own.
+    let mut preset = program("replay");
+    preset
+        .arg("predict")
+        .arg(&half)
+        .args(["--to", "960x1080", "--preset", "adreno-740", "--json"]);
+    let preset = answer(&mut preset);
+    let of_preset = |key: &str| {
+        preset["rows"]
+            .as_array()
+            .is_some_and(|rows| rows.iter().all(|row| row[key].is_string()))
+    };
+    assert_eq!(preset["rows"][0]["caches"], "2/1024");
+    assert!(
+        of_preset("answer") && preset["config"]["line_bytes"] == 64,
+        "{preset}"
     );
 }

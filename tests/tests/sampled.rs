@@ -134,6 +134,59 @@ fn one_command_gives_the_answer_of_its_steps() {
     );
 }
 
+/// A trace of all frames needs no plan: the frames of the sample are replayed, or all of them for a narrow promise.
+#[test]
+fn a_trace_of_all_frames_is_sampled_without_a_plan() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let all = path("all.textrace");
+    run_ok(&mut tracegen(&["--frames", "40", "--no-plain"], &all));
+    let sample = |within: &str, more: &[&str]| {
+        let mut command = program("replay");
+        command.arg("sample").arg(&all).args(["--within", within]);
+        answer(command.args(["--caches", "1/4", "--json"]).args(more))
+    };
+    let some = sample("20points", &[]);
+    let drawn = |of: &Value| -> u64 {
+        let strata = of["strata"].as_array().expect("strata");
+        strata
+            .iter()
+            .filter_map(|stratum| stratum[1].as_u64())
+            .sum()
+    };
+    assert!((2..20).contains(&drawn(&some)), "{some}");
+    let values = path("values.csv");
+    let narrow = ["--save-values", values.to_str().expect("a name")];
+    let every = sample("0.000001points", &narrow);
+    assert_eq!((drawn(&every), every["capture"].as_str()), (40, Some("")));
+    let figure = |of: &Value, key: &str| of["rows"][0]["figures"]["value"][key].as_f64();
+    let whole = figure(&every, "value").expect("a saving");
+    let [low, high] = ["low", "high"].map(|end| figure(&some, end).expect(end));
+    assert!(low <= whole && whole <= high, "{low} {whole} {high}");
+    // All frames in one run: the figure is that of a replay of the trace.
+    let mut run = program("replay");
+    run.arg("orders")
+        .arg(&all)
+        .args(["--mode", "functional", "--caches", "1/4"]);
+    let rows = answer(run.args(["--orders", "morton,z2-sta", "--json"]));
+    let bytes = |at: usize| rows["rows"][at]["external_bytes"].as_f64().expect("bytes");
+    let exact = 100.0 * (1.0 - bytes(1) / bytes(0));
+    assert!((whole - exact).abs() < 1e-9, "{whole} {exact}");
+    let part = path("part.textrace");
+    run_ok(&mut tracegen(&["--frames", "3,17", "--no-plain"], &part));
+    refuse(
+        program("replay").arg("sample").arg(&part),
+        &[
+            "part.textrace",
+            "expected a plan",
+            "or one trace of all frames",
+        ],
+    );
+}
+
 #[test]
 fn contradicting_questions_are_refused() {
     let replay = |flags: &[&str]| {

@@ -6,8 +6,8 @@ use sim::order::frames;
 use sim::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
 
 /// Distinct lines of a trace whose samples read levels as if its pictures had sides `zoom` times as long. Such samples
-/// are those of every `zoom`-th pixel of the larger picture, whose footprints together read most of its lines: over
-/// twelve scenes, 91 to 100 % of the growth at twice the size.
+/// are those of every `zoom`-th pixel of the larger picture. Footprints of neighbours share lines, so these read most of its
+/// lines.
 ///
 /// # Errors
 /// An impossible configuration, or an unreadable trace.

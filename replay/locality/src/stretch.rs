@@ -111,6 +111,11 @@ impl Reuses {
         }
     }
 
+    /// Distinct lines.
+    pub fn lines(&self) -> f64 {
+        self.first_uses
+    }
+
     /// The reuses at a larger size. `smaller` is the same stream at a smaller size, where a side is `step` times shorter.
     /// Lines and counts grow by the `power`-th power of their growth from there to here.
     #[must_use]

@@ -73,7 +73,7 @@ impl Document for PredictReport {
             .real("stretched_pct", "without interval", "%", 1, |r| r.saving_pct)
                 .about("the same saving, also where it has no interval")
             .real("low_near_pct", "lowest near this L2", "%", 1, |r| r.around_pct[0])
-                .about("lowest saving with an L2 of 5/8 to 8/5 of this size")
+                .about("lowest saving with an L2 of half to twice this size")
             .real("high_near_pct", "highest near this L2", "%", 1, |r| r.around_pct[1])
                 .about("highest saving with such an L2")
             .whole("external_bytes_per_frame", "external", "bytes per frame", |r| r.frame_bytes.round() as u64)
@@ -115,6 +115,6 @@ impl Document for PredictReport {
 
     fn text(&self, style: Style) -> String {
         let keys = ["caches", "order", "saving_pct", "stretched_pct", "answer"];
-        self.rows().picked(keys.into_iter()).styled(style)
+        self.rows().picked(keys).styled(style)
     }
 }

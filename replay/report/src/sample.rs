@@ -184,7 +184,7 @@ impl Document for SampleReport {
             .not_bounded
             .map(|why| format!("What earlier frames left in the caches is not bounded ({why})."));
         let promise = format!(
-            "{n} of {of} frames captured; all intervals hold together with {} % confidence, {kept}.",
+            "{n} of {of} frames in the sample; all intervals hold together with {} % confidence, {kept}.",
             100.0 * self.confidence
         );
         let parts = [found, Some(promise), cold];

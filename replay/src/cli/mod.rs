@@ -110,7 +110,7 @@ enum Command {
     #[command(mut_args(without(&["order", "l1", "l2", "details"])))]
     Sample(Box<sample::Args>),
     /// Predict what orders save at a larger picture size than the captured one.
-    #[command(mut_args(without(&["order", "l1", "l2", "l3", "details", "mode", "prefetch", "dram", "frame"])))]
+    #[command(mut_args(without(&["order", "l3", "details", "mode", "prefetch", "dram", "frame"])))]
     Predict(Box<predict::Args>),
     /// Model frame time by scheduler: shaders, texture units, caches and DRAM in a closed loop.
     #[command(mut_args(without(&["order", "mode", "l3", "assign", "between_frames", "prefetch", "frame", "count_by", "tmu", "memory_cycles", "loop_cycles", "tmu_threads", "retry_footprints", "fetches_per_trip", "allocation"])))]

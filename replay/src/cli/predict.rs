@@ -1,6 +1,6 @@
 //! `replay predict`: what orders save at a size that was not captured, from a capture at a smaller one.
 
-use super::experiment_args::{parse_caches, refuse_varied};
+use super::experiment_args::{parse_caches, refuse_sizes};
 use super::order_arg::parse_named;
 use super::outputs::ReplayArgs;
 use super::subjects::Traces;
@@ -17,13 +17,16 @@ use studies::predict::{not_predicted, predict};
 /// Largest difference between the ratios of two pictures' widths and heights.
 const SHAPE: f64 = 0.02;
 
+/// Caches without other sizes.
+const USUAL_CACHES: &str = "8/128,8/512,8/2048";
+
 /// Arguments of `replay predict`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay predict half.textrace --to 1920x2160
   replay predict half.textrace --to 1920x2160 --orders z2-sta --caches 8/512,16/1024 --json
   replay predict --to 1920x2160 -- tracegen raster jungle --size 960x1080
-docs/results/sizes.md has the errors.")]
+docs/models/size-prediction.md has the errors.")]
 pub struct Args {
     /// Texture trace at a smaller size
     #[arg(value_name = "TRACE")]
@@ -41,9 +44,10 @@ pub struct Args {
     /// Order that savings are over
     #[arg(long, value_name = "ORDER", default_value = "morton")]
     baseline: String,
-    /// L1/L2 sizes in KiB, comma-separated. The L2 has 16 ways and a hashed set index unless flags set them
-    #[arg(long, value_name = "L1/L2,...", default_value = "8/128,8/512,8/2048")]
-    caches: String,
+    /// L1/L2 sizes in KiB, comma-separated [default: those of --preset, --config, --l1 and --l2, else
+    /// 8/128,8/512,8/2048]. The L2 has 16 ways and a hashed set index unless flags set them
+    #[arg(long, value_name = "L1/L2,...")]
+    caches: Option<String>,
     #[command(flatten)]
     replay: ReplayArgs,
 }
@@ -66,8 +70,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ..RunConfig::default()
     };
     (usual.level.l2.ways, usual.level.l2.set_index) = (16, SetIndex::Xor);
-    let config = args.replay.machine.resolve_over(usual)?;
-    refuse_varied(&config, &usual)?;
+    let mut config = args.replay.machine.resolve_over(usual)?;
+    // DRAM changes no count of bytes.
+    config.dram = None;
+    ensure!(
+        config.order == usual.order,
+        "--order is varied here; use --orders"
+    );
     if let Some([key, expected, found]) = not_predicted(&config) {
         bail!("{key}: expected {expected} with `replay predict`, found {found}");
     }
@@ -82,7 +91,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--orders: expected an order other than the baseline, found `{}`",
         args.orders
     );
-    let caches = parse_caches(&args.caches)?;
+    let [sizes, usual_sizes] = [&config, &usual].map(|of| {
+        let level = &of.level;
+        (level.l1.size_bytes, level.l2.size_bytes)
+    });
+    let caches = match &args.caches {
+        Some(caches) => {
+            refuse_sizes(&config, &usual)?;
+            parse_caches(caches)?
+        }
+        None if sizes != usual_sizes => vec![sizes],
+        None => parse_caches(USUAL_CACHES)?,
+    };
     let paths = [args.trace.clone()];
     let prints = args.replay.check::<PredictReport>(&paths)?;
     let traces = Traces::open(&paths)?;

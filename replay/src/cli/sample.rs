@@ -18,7 +18,7 @@ use std::process::{Command, ExitCode};
 use studies::sampling::of::Of;
 use studies::sampling::points::{Points, aim, bounds};
 use studies::sampling::sample::{Aim, Promise, Sample, Step, Within};
-use studies::sampling::strata::{Planned, planned};
+use studies::sampling::strata::{Planned, planned, recorded};
 use studies::sampling::trial::trial;
 
 /// Arguments of `replay sample`.
@@ -29,10 +29,11 @@ use studies::sampling::trial::trial;
   replay sample plan.textrace --within 1points
   tracegen raster jungle --path head --frames 12,40..42,77 -o part.textrace
   replay sample plan.textrace part.textrace --within 1points
+  replay sample all-frames.textrace --within 1points
 The first line does what the other four do step by step: it plans the path, captures a pilot and the frames that the
-promise needs, and replays them. docs/models/sampling.md explains the intervals.")]
+promise needs, and replays them. The last one replays a part of the frames of a trace that has all. docs/models/sampling.md explains the intervals.")]
 pub struct Args {
-    /// Plan of a path, then traces of its frames
+    /// Plan of a path, then traces of its frames; or one trace of all frames
     #[arg(
         value_name = "TRACE",
         required_unless_present = "command",
@@ -168,9 +169,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = match (args.command.split_first(), args.draws) {
         (Some((program, rest)), _) => driven(args, &mut points, &promise, program, rest)?,
         (None, draws) => {
-            let plan = plan_of(&args.traces[0])?;
+            let (plan, whole) = plan_of(&args.traces)?;
             match &args.values {
                 Some(path) => counts_file::read(path, &mut points)?,
+                None if whole.is_some() && draws.is_some() => {
+                    add(&mut points, &args.traces[0], false)?
+                }
                 None => {
                     for path in &args.traces[1..] {
                         add(&mut points, path, draws.is_none())?;
@@ -183,7 +187,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 args.replay.outputs.write(&report, prints)?;
                 return Ok(ExitCode::SUCCESS);
             }
-            stepped(args, &points, &plan, &promise)
+            match whole {
+                Some(trace) => of_whole(args, &mut points, &plan, &promise, &trace)?,
+                None => stepped(args, &points, &plan, &promise),
+            }
         }
     };
     save_values(args, &points)?;
@@ -192,23 +199,33 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::from(u8::from(broken)))
 }
 
-/// The frames of a plan.
-fn plan_of(path: &Path) -> Result<Vec<Planned>> {
+/// The frames of a path from its plan, or from a trace of all frames, which is returned, too.
+fn plan_of(paths: &[PathBuf]) -> Result<(Vec<Planned>, Option<Textrace>)> {
+    let path = &paths[0];
     let plan = Textrace::open(path)?;
     let meta = &plan.tables().meta;
-    let Some(counts) = &meta.plan else {
-        bail!(
-            "{}: expected a plan (tracegen raster --plan-only), found a trace of captured frames",
-            path.display()
-        );
-    };
-    Ok(planned(&meta.frames, counts))
+    if let Some(counts) = &meta.plan {
+        return Ok((planned(&meta.frames, counts), None));
+    }
+    ensure!(
+        paths.len() == 1 && meta.warm_frames.is_empty(),
+        "{}: expected a plan (tracegen raster --plan-only) or one trace of all frames, found a trace of captured frames",
+        path.display()
+    );
+    let numbers: Vec<u32> = meta.frames.iter().map(|views| views.frame).collect();
+    ensure!(
+        numbers == sim::order::frames(&plan.tables().passes),
+        "{}: expected the poses of every frame, found {} poses",
+        path.display(),
+        numbers.len()
+    );
+    Ok((recorded(&plan), Some(plan)))
 }
 
 /// Replays a trace and adds the counts of its frames.
 fn add(points: &mut Points, path: &Path, bounds_cold: bool) -> Result<()> {
     let (trace, _) = open_textrace(path)?;
-    let added = points.add(&trace, bounds_cold);
+    let added = points.add(&trace, None, bounds_cold);
     added.with_context(|| path.display().to_string())
 }
 
@@ -261,6 +278,28 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
     report
 }
 
+/// Replays the frames of a trace that the promise needs.
+fn of_whole(
+    args: &Args,
+    points: &mut Points,
+    plan: &[Planned],
+    promise: &Promise,
+    trace: &Textrace,
+) -> Result<SampleReport> {
+    let mut replayed = 0;
+    loop {
+        let report = stepped(args, points, plan, promise);
+        if report.capture.is_empty() {
+            return Ok(report);
+        }
+        replayed += report.capture.len();
+        // With all frames, one run from the first to the last leaves no cold start.
+        let wanted = (replayed < plan.len()).then_some(report.capture.as_slice());
+        let added = points.add(trace, wanted, true);
+        added.with_context(|| args.traces[0].display().to_string())?;
+    }
+}
+
 /// Plans, captures and replays until the sample is complete.
 fn driven(
     args: &Args,
@@ -289,7 +328,7 @@ fn driven(
     };
     let file = folder.join("plan.textrace");
     capture(&["--plan-only"], &file)?;
-    let plan = plan_of(&file)?;
+    let (plan, _) = plan_of(std::slice::from_ref(&file))?;
     let mut report = stepped(args, points, &plan, promise);
     for stage in 1..=STAGES {
         if report.capture.is_empty() {

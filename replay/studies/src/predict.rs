@@ -4,7 +4,7 @@
 //! grow on is counted with the levels of the wanted size ([`distinct_lines`]).
 
 use locality::{Reuses, Stream, Streams, analyse, distinct_lines};
-use sim::config::{LevelConfig, Order, Replacement, RunConfig, SetIndex};
+use sim::config::{Order, Replacement, RunConfig, SetIndex};
 use sim::engine::ReplayError;
 use sim::figure::{Because, Figure};
 use sim::order::frames;
@@ -14,13 +14,13 @@ use std::collections::btree_map::Entry;
 use std::ops::RangeInclusive;
 
 /// A prediction is inside a knee if an L2 so many times as large or as small changes it by more than [`KNEE_POINTS`].
-pub const KNEE_FACTOR: f64 = 1.6;
+pub const KNEE_FACTOR: f64 = 2.0;
 
 /// See [`KNEE_FACTOR`].
 pub const KNEE_POINTS: f64 = 10.0;
 
-/// Largest error of a prediction outside the knees, in points, over the scenes of `results/sizes-coverage.csv` and
-/// `results/sizes-single-summary.csv`.
+/// Largest error of a prediction outside the knees, in points, over the scenes of `results/sizes-coverage.csv`,
+/// `results/single-frame-summary.csv` and `results/single-frame-machines.csv`.
 pub const LARGEST_ERROR_POINTS: f64 = 5.4;
 
 /// Scenes and sources of that error.
@@ -31,6 +31,10 @@ const LEAST_PX: u64 = 480 * 540;
 
 /// Largest ratio of the wanted sides to the captured ones with that error. Sides are rounded to whole pixels.
 const MOST_GROWTH: f64 = 3.03;
+
+/// Sizes of the L1s and of lines with at most that error (`results/single-frame-machines.csv`).
+const L1_BYTES: RangeInclusive<u64> = 2 << 10..=32 << 10;
+const LINE_BYTES: RangeInclusive<u32> = 16..=128;
 
 /// Sizes of the L2s with that error, in bytes.
 const L2_BYTES: RangeInclusive<u64> = 128 << 10..=2 << 20;
@@ -93,7 +97,7 @@ pub fn predict(
 ) -> Result<Vec<Predicted>, ReplayError> {
     let frames = frames(&trace.tables().passes).len().max(1) as f64;
     let halved = Halved::new(trace, config)?;
-    let power = growth_of_lines([&halved, trace], growth, config)?;
+    let mut power = None;
     let mut analysed: BTreeMap<u64, Vec<Reuses>> = BTreeMap::new();
     let mut predicted = Vec::new();
     for &(l1, l2) in caches_bytes {
@@ -105,6 +109,13 @@ pub fn predict(
             Entry::Vacant(new) => {
                 let of = |trace| reuses(trace, &machine, orders, done);
                 let (small, own) = (of(&halved)?, of(trace)?);
+                let power = match power {
+                    Some(power) => power,
+                    None => {
+                        let lines = [&small, &own].map(|of| of.first().map_or(0.0, Reuses::lines));
+                        *power.insert(growth_of_lines([&halved, trace], lines, growth, config)?)
+                    }
+                };
                 let pairs = small.iter().zip(&own);
                 let stretched = pairs.map(|(small, own)| own.stretched(small, STEP, power));
                 new.insert(stretched.collect())
@@ -116,7 +127,7 @@ pub fn predict(
             let sets = l2 as f64 * factor / line_bytes / f64::from(level.ways);
             of.misses(sets, level.ways) * line_bytes / frames
         };
-        let unmeasured = unmeasured(level, pixels(trace), growth);
+        let unmeasured = unmeasured(&machine, pixels(trace), growth);
         let Some((baseline, others)) = reuses.split_first() else {
             continue;
         };
@@ -149,7 +160,8 @@ fn pixels(trace: &dyn TileSource) -> u64 {
 }
 
 /// Why the errors of a prediction were not measured.
-fn unmeasured(level: &LevelConfig, pixels: u64, growth: f64) -> Option<&'static str> {
+fn unmeasured(config: &RunConfig, pixels: u64, growth: f64) -> Option<&'static str> {
+    let level = &config.level.l2;
     let is_even = level.set_index != SetIndex::Modulo || level.ways >= 16;
     let reasons = [
         (!is_even, "fewer than 16 ways without a hash"),
@@ -158,6 +170,14 @@ fn unmeasured(level: &LevelConfig, pixels: u64, growth: f64) -> Option<&'static 
         (
             !L2_BYTES.contains(&level.size_bytes),
             "an L2 outside 128 KiB to 2 MiB",
+        ),
+        (
+            !L1_BYTES.contains(&config.level.l1.size_bytes),
+            "an L1 outside 2 to 32 KiB",
+        ),
+        (
+            !LINE_BYTES.contains(&config.line_bytes),
+            "lines outside 16 to 128 bytes",
         ),
     ];
     let found = reasons.into_iter().find(|(holds, _)| *holds);
@@ -177,26 +197,26 @@ fn reuses(
     Ok(l2.map(|(_, figures)| Reuses::new(figures)).collect())
 }
 
-/// The power of the growth of lines from the halved pictures to those of the trace by which lines grow on to the wanted
-/// size. It falls where textures reach their finest level.
+/// The power of the growth of lines from the halved pictures to those of the trace, which have so many `lines`, by which
+/// they grow on to the wanted size. It falls where textures reach their finest level.
 fn growth_of_lines(
     [small, own]: [&dyn TileSource; 2],
+    [of_small, of_own]: [f64; 2],
     growth: f64,
     config: &RunConfig,
 ) -> Result<f64, ReplayError> {
+    let power = growth.ln() / STEP.ln();
+    let last = of_own / of_small.max(1.0);
+    if last <= 1.0 || growth <= 1.0 {
+        return Ok(power);
+    }
     let lines = |trace, zoom| {
         let lines = distinct_lines(trace, config, zoom)?;
         Ok::<f64, ReplayError>(lines.max(1) as f64)
     };
-    let power = growth.ln() / STEP.ln();
-    let [at_small, at_own] = [lines(small, 1.0)?, lines(own, 1.0)?];
-    let last = at_own / at_small;
-    if last <= 1.0 {
-        return Ok(power);
-    }
     // What the samples of the halved pictures do not read of the lines of the larger ones.
-    let missed = last * at_small / lines(small, STEP)?;
-    let next = lines(own, growth)? / at_own * missed.powf(power);
+    let missed = of_own / lines(small, STEP)?;
+    let next = lines(own, growth)? / of_own * missed.powf(power);
     Ok(next.max(1.0).ln() / last.ln())
 }
 

@@ -9,9 +9,7 @@ use rayon::prelude::*;
 use sim::config::{BetweenFrames, Mode, RunConfig};
 use sim::engine::ReplayError;
 use sim::memory::{Cache, Found, Hierarchy};
-use sim::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, Walk, interleave, rendered,
-};
+use sim::stream::{Consumer, Cores, Expander, LineMemory, QuadLines, Walk, interleave, rendered};
 use std::collections::BTreeMap;
 
 /// Why a configuration has no bounds; `None` if it has them.
@@ -93,16 +91,12 @@ impl Consumer for Counting {
     }
 }
 
-/// What each frame may have missed. Caches are empty where frame numbers leave a gap; frame 0 has no frames before it.
+/// What each frame may have missed. Each run starts with empty caches; frame 0 has no frames before it.
 ///
 /// # Errors
 /// An invalid configuration, or an unreadable trace.
-pub fn cold(
-    trace: &dyn TileSource,
-    config: &RunConfig,
-) -> Result<BTreeMap<u32, Cold>, ReplayError> {
+pub fn cold(runs: &[Run<'_>], config: &RunConfig) -> Result<BTreeMap<u32, Cold>, ReplayError> {
     config.validate()?;
-    let runs = Run::all(trace);
     let found: Vec<_> =
         (runs.par_iter().map(|run| of_run(run, config))).collect::<Result<_, _>>()?;
     Ok(found.into_iter().flatten().collect())

@@ -2,6 +2,7 @@
 
 use super::cold::{Cold, cold, not_bounded};
 use super::of::Of;
+use super::run::Run;
 use super::sample::{Aim, Sample};
 use super::values::{FrameCounts, Series, by_frame};
 use sim::config::{Order, RunConfig};
@@ -52,19 +53,31 @@ impl Points {
         }
     }
 
-    /// Replays a trace and adds the counts of its frames, except for those that only fill the caches. `bounds_cold` also
-    /// counts what frames may have missed because the frames before them are absent.
+    /// Replays a trace, or some of its frames, and adds the counts of the frames, except for those that only fill the
+    /// caches. `bounds_cold` also counts what frames may have missed because the frames before them are absent.
     ///
     /// # Errors
     /// An impossible configuration, or an unreadable trace.
-    pub fn add(&mut self, trace: &dyn TileSource, bounds_cold: bool) -> Result<(), ReplayError> {
+    pub fn add(
+        &mut self,
+        trace: &dyn TileSource,
+        wanted: Option<&[u32]>,
+        bounds_cold: bool,
+    ) -> Result<(), ReplayError> {
         let warm = &trace.tables().meta.warm_frames;
+        let counts = |frame: &u32| match wanted {
+            Some(wanted) => wanted.binary_search(frame).is_ok(),
+            None => warm.binary_search(frame).is_err(),
+        };
+        let runs = wanted.map_or_else(|| Run::all(trace), |wanted| Run::around(trace, wanted));
         let configs: Vec<RunConfig> = self.points.iter().map(|point| point.config).collect();
-        for (point, mut series) in self.points.iter_mut().zip(by_frame(trace, &configs)?) {
-            series.retain(|frame, _| warm.binary_search(frame).is_err());
+        for (point, mut series) in self.points.iter_mut().zip(by_frame(&runs, &configs)?) {
+            series.retain(|frame, _| counts(frame));
             point.values.extend(series);
             if bounds_cold && not_bounded(&point.config).is_none() {
-                point.cold.extend(cold(trace, &point.config)?);
+                let mut of_frames = cold(&runs, &point.config)?;
+                of_frames.retain(|frame, _| counts(frame));
+                point.cold.extend(of_frames);
             }
         }
         Ok(())

@@ -20,6 +20,15 @@ impl<'t> Run<'t> {
         runs.map(|run| Self::new(trace, run)).collect()
     }
 
+    /// Runs with some frames of a trace, and the frame before each run, which fills its caches.
+    pub fn around(trace: &'t dyn TileSource, wanted: &[u32]) -> Vec<Self> {
+        let is_wanted = |number: &u32| wanted.binary_search(number).is_ok();
+        let mut numbers = frames(&trace.tables().passes);
+        numbers.retain(|number| is_wanted(number) || is_wanted(&(number + 1)));
+        let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+        runs.map(|run| Self::new(trace, run)).collect()
+    }
+
     fn new(trace: &'t dyn TileSource, numbers: &[u32]) -> Self {
         let mut tables = trace.tables().clone();
         let of_run = (0..).zip(std::mem::take(&mut tables.passes));

@@ -1,6 +1,6 @@
 //! Which frames of a path are alike: strata from what is known without drawing.
 
-use formats::textrace::PlannedFrame;
+use formats::textrace::{PlannedFrame, Textrace};
 use formats::view::{Eye, FrameViews};
 use glam::Vec3;
 use std::ops::Range;
@@ -21,6 +21,26 @@ pub struct Planned {
 const CUT_DEG: f32 = 45.0;
 /// Step from the frame before, over the path's median step, from which on a frame is a cut.
 const CUT_STEPS: f32 = 20.0;
+
+/// The frames of a trace of all frames, with what its index knows: quads, runs of primitives and bytes.
+pub fn recorded(trace: &Textrace) -> Vec<Planned> {
+    let tables = trace.tables();
+    let of_frame = |views: &FrameViews| {
+        let mut counts = PlannedFrame::default();
+        let passes = tables.passes.iter().enumerate();
+        for (number, pass) in passes.filter(|(_, pass)| pass.frame == views.frame) {
+            for tile in 0..pass.tile_count() as usize {
+                let stats = trace.tile_stats(number, tile);
+                counts.draws += u64::from(stats.records);
+                counts.triangles += u64::from(stats.runs);
+                counts.texels += u64::from(stats.bytes);
+            }
+        }
+        counts
+    };
+    let counts: Vec<PlannedFrame> = tables.meta.frames.iter().map(of_frame).collect();
+    planned(&tables.meta.frames, &counts)
+}
 
 /// The frames of a path with what their plan knows.
 pub fn planned(views: &[FrameViews], plan: &[PlannedFrame]) -> Vec<Planned> {

@@ -1,6 +1,7 @@
 use super::cold::{Cold, cold};
 use super::estimate::{Stratum, chi_square, estimate, figure, student};
 use super::of::Of;
+use super::run::Run;
 use super::sample::{Aim, Promise, Sample, Step, Within};
 use super::stages::{fewest, pilot};
 use super::strata::Planned;
@@ -230,7 +231,7 @@ fn counts_by_frame_add_up_to_a_replay_of_all_frames() {
     for mode in [Mode::Functional, Mode::Timed] {
         let config = machine(mode, 4 << 10);
         let whole = replay(&trace, &config).unwrap();
-        let series = by_frame(&trace, &[config]).unwrap().remove(0);
+        let series = by_frame(&Run::all(&trace), &[config]).unwrap().remove(0);
         let sum = |of: fn(&FrameCounts) -> u64| series.values().map(of).sum::<u64>();
         assert_eq!(series.keys().copied().collect::<Vec<_>>(), [0, 1, 2]);
         assert!(series.values().all(|frame| frame.external_bytes > 0));
@@ -245,15 +246,24 @@ fn counts_by_frame_add_up_to_a_replay_of_all_frames() {
 fn a_gap_in_the_numbers_of_frames_empties_the_caches() {
     let trace = different_frames();
     let config = machine(Mode::Functional, 64 << 10);
-    let apart = by_frame(&only(&trace, &[0, 2]), &[config])
+    let apart = by_frame(&Run::all(&only(&trace, &[0, 2])), &[config])
         .unwrap()
         .remove(0);
     for frame in [0, 2] {
         let alone = replay(&only(&trace, &[frame]), &config).unwrap();
         assert_eq!(apart[&frame].external_bytes, alone.external_bytes);
     }
-    let warmed = by_frame(&trace, &[config]).unwrap().remove(0);
+    let warmed = by_frame(&Run::all(&trace), &[config]).unwrap().remove(0);
     assert!(warmed[&2].external_bytes < apart[&2].external_bytes);
+    // A frame of a trace of all frames comes after the frame before it.
+    let around = by_frame(&Run::around(&trace, &[2]), &[config])
+        .unwrap()
+        .remove(0);
+    let after = by_frame(&Run::all(&only(&trace, &[1, 2])), &[config])
+        .unwrap()
+        .remove(0);
+    assert_eq!(around, after);
+    assert_eq!(around.len(), 2);
 }
 
 /// The bytes of a frame after all frames before it lie between the bounds of a capture of some of them.
@@ -263,11 +273,11 @@ fn bounds_of_a_cold_start_enclose_the_frame_of_the_whole_path() {
     let (mut exact, mut open) = (0, 0);
     for l2_kib in [1, 2, 4, 8, 16, 64, 256] {
         let config = machine(Mode::Functional, l2_kib << 10);
-        let whole = by_frame(&trace, &[config]).unwrap().remove(0);
+        let whole = by_frame(&Run::all(&trace), &[config]).unwrap().remove(0);
         for captured in [&[2][..], &[1, 2]] {
             let part = only(&trace, captured);
-            let most = by_frame(&part, &[config]).unwrap().remove(0)[&2].external_bytes;
-            let cold = cold(&part, &config).unwrap()[&2];
+            let most = by_frame(&Run::all(&part), &[config]).unwrap().remove(0)[&2].external_bytes;
+            let cold = cold(&Run::all(&part), &config).unwrap()[&2];
             let truth = whole[&2].external_bytes;
             if cold.l1_misses == 0 {
                 assert!(
@@ -284,9 +294,9 @@ fn bounds_of_a_cold_start_enclose_the_frame_of_the_whole_path() {
         between_frames: BetweenFrames::Flush,
         ..machine(Mode::Functional, 4 << 10)
     };
-    let from_the_start = cold(&trace, &machine(Mode::Functional, 4 << 10)).unwrap();
+    let from_the_start = cold(&Run::all(&trace), &machine(Mode::Functional, 4 << 10)).unwrap();
     for cold in [
-        cold(&only(&trace, &[1, 2]), &flush).unwrap(),
+        cold(&Run::all(&only(&trace, &[1, 2])), &flush).unwrap(),
         from_the_start,
     ] {
         assert!(cold.values().all(|cold| *cold == Cold::default()));

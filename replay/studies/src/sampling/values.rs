@@ -4,7 +4,7 @@ use super::run::Run;
 use sim::config::RunConfig;
 use sim::engine::{Job, ReplayError, replay_jobs};
 use sim::result::RunResult;
-use sim::stream::{LineMemory, TileSource};
+use sim::stream::LineMemory;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -53,13 +53,12 @@ impl FrameCounts {
 /// Counts of each frame, by its number.
 pub type Series = BTreeMap<u32, FrameCounts>;
 
-/// Replays a trace with each configuration and counts by frame, in the order of `configs`. Caches are empty where frame
-/// numbers leave a gap, because what they held is unknown.
+/// Replays runs of frames with each configuration and counts by frame, in the order of `configs`. Each run starts with empty
+/// caches, because what they held is unknown.
 ///
 /// # Errors
 /// An impossible configuration, or an unreadable trace.
-pub fn by_frame(trace: &dyn TileSource, configs: &[RunConfig]) -> Result<Vec<Series>, ReplayError> {
-    let runs = Run::all(trace);
+pub fn by_frame(runs: &[Run<'_>], configs: &[RunConfig]) -> Result<Vec<Series>, ReplayError> {
     let sums = Mutex::new(vec![vec![Series::new(); configs.len()]; runs.len()]);
     let receive = |run: usize| {
         let sums = &sums;
