@@ -175,6 +175,46 @@ fn a_trace_of_all_frames_is_sampled_without_a_plan() {
     let bytes = |at: usize| rows["rows"][at]["external_bytes"].as_f64().expect("bytes");
     let exact = 100.0 * (1.0 - bytes(1) / bytes(0));
     assert!((whole - exact).abs() < 1e-9, "{whole} {exact}");
+    // Other commands answer as the sample does.
+    let mut orders = program("replay");
+    orders
+        .arg("orders")
+        .arg(&all)
+        .args(["--within", "20points", "--caches", "1/4"]);
+    assert_eq!(answer(orders.args(["--orders", "z2-sta", "--json"])), some);
+    let mut run = program("replay");
+    run.arg("run")
+        .arg(&all)
+        .args(["--within", "0.0001%", "--order", "z2-sta", "--json"]);
+    run.args(["--mode", "functional", "--l1", "1KiB", "--l2", "4KiB"]);
+    let bytes_per_frame = figure(&answer(&mut run), "value").expect("bytes");
+    assert!(
+        (bytes_per_frame - bytes(1) / 40.0).abs() < 1e-6,
+        "{bytes_per_frame}"
+    );
+    for (flags, expected) in [
+        (
+            &["orders", "--within", "1points", "--bounds"][..],
+            "expected no --bounds with it",
+        ),
+        (
+            &["orders", "--within", "1points", "--between", "keep,flush"],
+            "expected no --between with it",
+        ),
+        (
+            &["run", "--within", "1points"],
+            "expected percent, as in 1%,",
+        ),
+        (
+            &["run", "--within", "1%", "--compare-modes"],
+            "expected no --compare-modes with it",
+        ),
+        (&["run", "--of", "bytes"], "--within <WIDTH>"),
+    ] {
+        let mut command = program("replay");
+        command.arg(flags[0]).arg(&all).args(&flags[1..]);
+        refuse(&mut command, &[expected]);
+    }
     let part = path("part.textrace");
     run_ok(&mut tracegen(&["--frames", "3,17", "--no-plain"], &part));
     refuse(

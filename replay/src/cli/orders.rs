@@ -4,6 +4,7 @@ use super::ConfigArgs;
 use super::experiment_args::{parse_caches, refuse_varied};
 use super::order_arg::parse_named;
 use super::outputs::PageOutputs;
+use super::sample::WithinArgs;
 use super::subjects::Traces;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, Result, bail, ensure};
@@ -21,6 +22,7 @@ use studies::orders_study::search::{Method, Schedule};
 use studies::orders_study::{
     BASELINE, Corners, OrderFile, OrdersStudy, Searched, Subjects, default_orders,
 };
+use studies::sampling::of::Of;
 
 /// The default of `--caches` for machines without caches of their own: the paper's.
 const CACHES: &str = "8/128,16/128,8/256,16/256";
@@ -89,6 +91,8 @@ pub struct Args {
     #[arg(long, value_name = "ORDERS", num_args = 0..=1, default_missing_value = LEARNER)]
     learn: Option<String>,
     #[command(flatten)]
+    within: WithinArgs,
+    #[command(flatten)]
     outputs: PageOutputs,
     #[command(flatten)]
     threads: shell::Threads,
@@ -102,6 +106,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let study = study(args)?;
     let prints = check_outputs(args)?;
+    if args.within.within.is_some() {
+        return sampled(args, &study, prints);
+    }
     let traces = Traces::open(&args.traces)?;
     let opened = traces.subjects();
     let subjects = Subjects {
@@ -137,6 +144,37 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     args.outputs.write(&report, prints, || report.page())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Replays some frames of a trace, with savings over Morton order.
+fn sampled(args: &Args, study: &OrdersStudy, prints: bool) -> Result<ExitCode> {
+    let [path] = &args.traces[..] else {
+        bail!("--within: expected one trace, found {}", args.traces.len());
+    };
+    let other = [
+        ("--search", args.search.is_some()),
+        ("--order-file", !args.order_files.is_empty()),
+        ("--bounds", args.bounds),
+        ("--learn", args.learn.is_some()),
+        ("--between", study.between.len() > 1),
+        ("--html", args.outputs.html.is_some()),
+    ];
+    if let Some((flag, _)) = other.iter().find(|(_, is_given)| *is_given) {
+        bail!("--within: expected no {flag} with it, found both");
+    }
+    let base = RunConfig {
+        between_frames: study.between[0],
+        ..study.base
+    };
+    let mut orders = study.orders.clone();
+    orders.retain(|order| *order != Order::MORTON);
+    orders.insert(0, Order::MORTON);
+    let found = args
+        .within
+        .answer(Of::Saving, path, &base, &orders, &study.caches_bytes)?;
+    let report = found.context("--within")?;
+    args.outputs.write(&report, prints, || Ok(String::new()))?;
+    Ok(super::sample::exit_code(&report))
 }
 
 /// Builds the study from the arguments.

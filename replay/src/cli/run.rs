@@ -3,17 +3,19 @@
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
 use super::outputs::{self, Outputs};
+use super::sample::WithinArgs;
 use super::subjects::Traces;
 use crate::files;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use report::run::{ModesReport, RunReport};
 use shell::Output;
-use sim::config::{Mode, TmuModel};
+use sim::config::{Mode, RunConfig, TmuModel};
 use sim::preset::Preset;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use studies::experiment::{self, Plan};
+use studies::sampling::of::Of;
 
 /// Arguments of `replay run`.
 #[derive(Debug, clap::Args)]
@@ -55,6 +57,8 @@ pub struct Args {
     /// Print the whole configuration as TOML and stop
     #[arg(long, conflicts_with_all = ["json", "csv", "path", "compare_modes", "addresses"])]
     print_config: bool,
+    #[command(flatten)]
+    within: WithinArgs,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -119,6 +123,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let timeline = args.timeline.iter();
     outputs.extend(timeline.map(|path| Output::text("--timeline", path)));
     let prints = files::check_outputs(&outputs, inputs)?;
+    if args.within.within.is_some() {
+        return sampled(args, &path, &config, prints);
+    }
     let plan = Plan::single(config, args.compare_modes)?;
     args.threads.start()?;
     let traces = Traces::open(&[path])?;
@@ -153,4 +160,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .write(&ModesReport([timed, functional]), prints)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Replays some frames of a trace.
+fn sampled(args: &Args, path: &Path, config: &RunConfig, prints: bool) -> Result<ExitCode> {
+    let other = [
+        ("--timeline", args.timeline.is_some()),
+        ("--compare-modes", args.compare_modes),
+        ("--tiles", args.tiles),
+        ("--frame", config.frame.is_some()),
+    ];
+    if let Some((flag, _)) = other.iter().find(|(_, is_given)| *is_given) {
+        bail!("--within: expected no {flag} with it, found both");
+    }
+    args.threads.start()?;
+    let level = &config.level;
+    let sizes = [(level.l1.size_bytes, level.l2.size_bytes)];
+    let found = (args.within).answer(Of::Bytes, path, config, &[config.order], &sizes)?;
+    let report = found.context("--within")?;
+    args.outputs.write(&report, prints)?;
+    Ok(super::sample::exit_code(&report))
 }

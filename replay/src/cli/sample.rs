@@ -11,7 +11,7 @@ use formats::container::ScratchFolder;
 use formats::textrace::Textrace;
 use report::notices::open_textrace;
 use report::sample::{SampleReport, SampleRow, TrialReport, TrialRow, frame_list};
-use sim::config::{Mode, RunConfig};
+use sim::config::{Mode, Order, RunConfig};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -20,6 +20,9 @@ use studies::sampling::points::{Points, aim, bounds};
 use studies::sampling::sample::{Aim, Promise, Sample, Step, Within};
 use studies::sampling::strata::{Planned, planned, recorded};
 use studies::sampling::trial::trial;
+
+/// Confidence without `--confidence`.
+const CONFIDENCE_PCT: f64 = 95.0;
 
 /// Arguments of `replay sample`.
 #[derive(Debug, clap::Args)]
@@ -53,7 +56,7 @@ pub struct Args {
     #[arg(long, value_name = "FIGURE", default_value = "saving")]
     of: Of,
     /// Probability that all intervals hold together, percent
-    #[arg(long, value_name = "PERCENT", default_value_t = 95.0, value_parser = parse_confidence)]
+    #[arg(long, value_name = "PERCENT", default_value_t = CONFIDENCE_PCT, value_parser = parse_confidence)]
     confidence: f64,
     /// Orders, comma-separated
     #[arg(long, value_name = "ORDERS", default_value = "z2-sta")]
@@ -143,20 +146,7 @@ fn points(args: &Args) -> Result<Points> {
 /// Invalid arguments, an unreadable trace, a command that fails, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.replay.threads.start()?;
-    let (within, width) = &args.within;
-    ensure!(
-        matches!(width, Within::Points(_)) == args.of.is_share(),
-        "--within: expected {} for this figure, found {within}",
-        if args.of.is_share() {
-            "points, as in 1points,"
-        } else {
-            "percent, as in 1%,"
-        }
-    );
-    let promise = Promise {
-        within: *width,
-        confidence: args.confidence / 100.0,
-    };
+    let question = Question::new(args.of, &args.within, args.confidence, &args.baseline)?;
     let mut points = points(args)?;
     let mut outputs = match args.draws {
         Some(_) => args.replay.outputs.list::<TrialReport>()?,
@@ -167,7 +157,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let inputs = args.traces.iter().chain(&args.values).map(PathBuf::as_path);
     let prints = files::check_outputs(&outputs, inputs.chain(args.replay.machine.file()))?;
     let report = match (args.command.split_first(), args.draws) {
-        (Some((program, rest)), _) => driven(args, &mut points, &promise, program, rest)?,
+        (Some((program, rest)), _) => driven(args, &question, &mut points, program, rest)?,
         (None, draws) => {
             let (plan, whole) = plan_of(&args.traces)?;
             match &args.values {
@@ -182,21 +172,27 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 }
             }
             if let Some(draws) = draws {
-                let report = trials(args, &points, &plan, &promise, draws)?;
+                let report = trials(&question, &points, &plan, draws)?;
                 save_values(args, &points)?;
                 args.replay.outputs.write(&report, prints)?;
                 return Ok(ExitCode::SUCCESS);
             }
             match whole {
-                Some(trace) => of_whole(args, &mut points, &plan, &promise, &trace)?,
-                None => stepped(args, &points, &plan, &promise),
+                Some(trace) => of_whole(&question, &mut points, &plan, &trace)
+                    .with_context(|| args.traces[0].display().to_string())?,
+                None => question.answer(&points, &plan, args.values.is_some()),
             }
         }
     };
     save_values(args, &points)?;
     args.replay.outputs.write(&report, prints)?;
+    Ok(exit_code(&report))
+}
+
+/// Exit code 1 if a complete sample does not keep its promise.
+pub(super) fn exit_code(report: &SampleReport) -> ExitCode {
     let broken = report.capture.is_empty() && !report.rows.iter().all(|row| row.kept);
-    Ok(ExitCode::from(u8::from(broken)))
+    ExitCode::from(u8::from(broken))
 }
 
 /// The frames of a path from its plan, or from a trace of all frames, which is returned, too.
@@ -234,77 +230,178 @@ fn save_values(args: &Args, points: &Points) -> Result<()> {
     path.map_or(Ok(()), |path| counts_file::write(path, points))
 }
 
-/// The answer, or the frames that it lacks.
-fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) -> SampleReport {
-    let seed = points.points[0].config.seed;
-    let sample = Sample::new(plan, seed);
-    let aims: Vec<Aim<'_>> = points.asked(args.of).map(|of| aim(args.of, of)).collect();
-    let mut report = SampleReport {
-        rows: Vec::new(),
-        within: args.within.0.clone(),
-        confidence: promise.confidence,
-        seed,
-        baseline: args.baseline.clone(),
-        strata: Vec::new(),
-        capture: Vec::new(),
-        not_bounded: None,
-    };
-    let sizes = match sample.step(&aims, promise) {
-        Step::Capture(frames) => {
-            report.capture = frames;
-            vec![0; sample.strata.len()]
+/// Flags of commands that replay some of a trace's frames.
+#[derive(Debug, clap::Args)]
+pub(super) struct WithinArgs {
+    /// Replay only the frames that an interval of this width needs, as `replay sample` does: `1points` for shares,
+    /// `2%` for bytes and cycles
+    #[arg(long, value_name = "WIDTH", value_parser = parse_within, hide_short_help = true)]
+    pub within: Option<(String, Within)>,
+    /// Figure that --within is for
+    #[arg(
+        long,
+        value_name = "FIGURE",
+        requires = "within",
+        hide_short_help = true
+    )]
+    of: Option<Of>,
+    /// Probability that all intervals hold together, percent [default: 95]
+    #[arg(long, value_name = "PERCENT", requires = "within", value_parser = parse_confidence, hide_short_help = true)]
+    confidence: Option<f64>,
+}
+
+impl WithinArgs {
+    /// The answer for the orders, the baseline first, with pairs of L1 and L2 sizes in bytes, if the flag is given.
+    /// `usual` is the figure without --of.
+    ///
+    /// # Errors
+    /// A width or a figure that does not fit, or a trace without all frames.
+    pub fn answer(
+        &self,
+        usual: Of,
+        path: &Path,
+        base: &RunConfig,
+        orders: &[Order],
+        caches_bytes: &[(u64, u64)],
+    ) -> Result<Option<SampleReport>> {
+        let Some(within) = &self.within else {
+            return Ok(None);
+        };
+        let of = self.of.unwrap_or(usual);
+        ensure!(
+            of != Of::Cycles || base.mode == Mode::Timed,
+            "--of cycles: expected --mode timed, found functional, which has no cycles"
+        );
+        ensure!(
+            of != Of::Saving || orders.len() > 1,
+            "--of saving: expected several orders, found one"
+        );
+        let confidence = self.confidence.unwrap_or(CONFIDENCE_PCT);
+        let question = Question::new(of, within, confidence, orders[0].name())?;
+        let mut points = Points::new(base, orders, caches_bytes);
+        for point in &points.points {
+            point.config.validate()?;
         }
-        Step::Done(figures, sizes) => {
-            for (pair, figure) in points.asked(args.of).zip(figures) {
-                let bounds = match &args.values {
-                    Some(_) => Err("counts from a file"),
-                    None => bounds(&sample, args.of, pair, &sizes),
-                };
-                report.not_bounded = report.not_bounded.or(bounds.as_ref().err().copied());
-                report.rows.push(SampleRow {
-                    caches: pair[0].caches.clone(),
-                    order: pair[0].config.order.name().to_owned(),
-                    of: args.of,
-                    kept: figure.half() <= promise.half(figure.value) * (1.0 + 1e-9),
-                    warm_up: bounds.ok(),
-                    figure,
-                });
+        let (plan, Some(trace)) = plan_of(&[path.to_owned()])? else {
+            bail!(
+                "{}: expected a trace of all frames, found a plan",
+                path.display()
+            );
+        };
+        let report = of_whole(&question, &mut points, &plan, &trace);
+        report.with_context(|| path.display().to_string()).map(Some)
+    }
+}
+
+/// What is asked of a sample.
+struct Question {
+    of: Of,
+    /// Width, as given.
+    within: String,
+    promise: Promise,
+    /// The order that savings are over.
+    baseline: String,
+}
+
+impl Question {
+    /// `confidence` is in percent.
+    fn new(
+        of: Of,
+        (within, width): &(String, Within),
+        confidence: f64,
+        baseline: &str,
+    ) -> Result<Self> {
+        ensure!(
+            matches!(width, Within::Points(_)) == of.is_share(),
+            "--within: expected {} for this figure, found {within}",
+            if of.is_share() {
+                "points, as in 1points,"
+            } else {
+                "percent, as in 1%,"
             }
-            sizes
-        }
-    };
-    let strata = sample.strata.iter().zip(sizes);
-    report.strata = strata.map(|(block, n)| [block.frames.len(), n]).collect();
-    report
+        );
+        Ok(Self {
+            of,
+            within: within.clone(),
+            promise: Promise {
+                within: *width,
+                confidence: confidence / 100.0,
+            },
+            baseline: baseline.to_owned(),
+        })
+    }
+
+    /// The answer, or the frames that it lacks. Counts from a file have no bounds.
+    fn answer(&self, points: &Points, plan: &[Planned], is_from_file: bool) -> SampleReport {
+        let promise = &self.promise;
+        let seed = points.points[0].config.seed;
+        let sample = Sample::new(plan, seed);
+        let aims: Vec<Aim<'_>> = points.asked(self.of).map(|of| aim(self.of, of)).collect();
+        let mut report = SampleReport {
+            rows: Vec::new(),
+            within: self.within.clone(),
+            confidence: promise.confidence,
+            seed,
+            baseline: self.baseline.clone(),
+            strata: Vec::new(),
+            capture: Vec::new(),
+            not_bounded: None,
+        };
+        let sizes = match sample.step(&aims, promise) {
+            Step::Capture(frames) => {
+                report.capture = frames;
+                vec![0; sample.strata.len()]
+            }
+            Step::Done(figures, sizes) => {
+                for (pair, figure) in points.asked(self.of).zip(figures) {
+                    let bounds = match is_from_file {
+                        true => Err("counts from a file"),
+                        false => bounds(&sample, self.of, pair, &sizes),
+                    };
+                    report.not_bounded = report.not_bounded.or(bounds.as_ref().err().copied());
+                    report.rows.push(SampleRow {
+                        caches: pair[0].caches.clone(),
+                        order: pair[0].config.order.name().to_owned(),
+                        of: self.of,
+                        kept: figure.half() <= promise.half(figure.value) * (1.0 + 1e-9),
+                        warm_up: bounds.ok(),
+                        figure,
+                    });
+                }
+                sizes
+            }
+        };
+        let strata = sample.strata.iter().zip(sizes);
+        report.strata = strata.map(|(block, n)| [block.frames.len(), n]).collect();
+        report
+    }
 }
 
 /// Replays the frames of a trace that the promise needs.
 fn of_whole(
-    args: &Args,
+    question: &Question,
     points: &mut Points,
     plan: &[Planned],
-    promise: &Promise,
     trace: &Textrace,
 ) -> Result<SampleReport> {
     let mut replayed = 0;
     loop {
-        let report = stepped(args, points, plan, promise);
+        let report = question.answer(points, plan, false);
         if report.capture.is_empty() {
             return Ok(report);
         }
         replayed += report.capture.len();
         // With all frames, one run from the first to the last leaves no cold start.
         let wanted = (replayed < plan.len()).then_some(report.capture.as_slice());
-        let added = points.add(trace, wanted, true);
-        added.with_context(|| args.traces[0].display().to_string())?;
+        points.add(trace, wanted, true)?;
     }
 }
 
 /// Plans, captures and replays until the sample is complete.
 fn driven(
     args: &Args,
+    question: &Question,
     points: &mut Points,
-    promise: &Promise,
     program: &OsString,
     rest: &[OsString],
 ) -> Result<SampleReport> {
@@ -329,7 +426,7 @@ fn driven(
     let file = folder.join("plan.textrace");
     capture(&["--plan-only"], &file)?;
     let (plan, _) = plan_of(std::slice::from_ref(&file))?;
-    let mut report = stepped(args, points, &plan, promise);
+    let mut report = question.answer(points, &plan, false);
     for stage in 1..=STAGES {
         if report.capture.is_empty() {
             break;
@@ -347,7 +444,7 @@ fn driven(
         let added: Vec<&str> = ["--frames", &frames].into_iter().chain(skip).collect();
         capture(&added, &file)?;
         add(points, &file, true)?;
-        report = stepped(args, points, &plan, promise);
+        report = question.answer(points, &plan, false);
     }
     ensure!(
         report.capture.is_empty(),
@@ -359,15 +456,14 @@ fn driven(
 
 /// Trials of each figure.
 fn trials(
-    args: &Args,
+    question: &Question,
     points: &Points,
     plan: &[Planned],
-    promise: &Promise,
     draws: u64,
 ) -> Result<TrialReport> {
     let mut report = TrialReport::default();
-    for pair in points.asked(args.of) {
-        let aim = aim(args.of, pair);
+    for pair in points.asked(question.of) {
+        let aim = aim(question.of, pair);
         if let Some(frame) = plan.iter().find(|frame| aim.pair(frame.number).is_none()) {
             bail!(
                 "--draws: expected the counts of every frame, found none of frame {}",
@@ -377,8 +473,8 @@ fn trials(
         report.rows.push(TrialRow {
             caches: pair[0].caches.clone(),
             order: pair[0].config.order.name().to_owned(),
-            of: args.of,
-            trial: trial(plan, &aim, promise, draws),
+            of: question.of,
+            trial: trial(plan, &aim, &question.promise, draws),
         });
     }
     Ok(report)
