@@ -55,6 +55,38 @@ fn each_stage_counts_its_own_draws() {
     assert_eq!(draws(&without, "plain render"), None, "{without}");
 }
 
+/// Records are of coordinates, so a capture without pictures needs no texels but those of alpha tests.
+#[test]
+fn a_capture_without_pictures_prepares_the_texels_of_alpha_tests_alone() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for scene in ["atrium", "jungle"] {
+        let trace = |name: &str, flags: &[&str]| {
+            let file = folder.path().join(name).with_extension("textrace");
+            let options = [&[scene, "--size", "64x64"], flags].concat();
+            let text = said(&run_ok(&mut raster(&options, &file)));
+            let trace = Textrace::open(&file).expect("a trace");
+            (
+                trace.content_checksum(),
+                trace.tables().textures.clone(),
+                text,
+            )
+        };
+        let with_plain = trace("plain", &[]);
+        let without = trace("without", &["--no-plain"]);
+        let all = trace("all", &["--no-plain", "--no-skip", "images"]);
+        for other in [&without, &all] {
+            assert_eq!(
+                (with_plain.0, &with_plain.1),
+                (other.0, &other.1),
+                "{scene}"
+            );
+        }
+        let skips = "that no alpha test reads skipped";
+        assert!(without.2.contains(skips), "{}", without.2);
+        assert!(![&with_plain, &all].iter().any(|of| of.2.contains(skips)));
+    }
+}
+
 #[test]
 fn smaller_shadow_maps_only_take_shadow_away_and_stand_in_the_trace() {
     let folder = tempfile::tempdir().expect("a temporary folder");

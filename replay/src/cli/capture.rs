@@ -65,7 +65,11 @@ impl Capture {
             .join(name(&words[3..]))
             .with_extension(extension);
         let mut command = Command::new(&words[1]);
-        command.arg(kind).arg("-o").arg(&output).args(&words[3..]);
+        command.arg(kind).arg("-o").arg(&output);
+        if kind == "raster" && !draws_plainly(&words[3..]) {
+            command.arg("--no-plain");
+        }
+        command.args(&words[3..]);
         arguments.push(output.clone().into());
         let _folder = folder;
         Ok((
@@ -85,6 +89,15 @@ impl Capture {
     pub fn run(&mut self) -> Result<()> {
         run(&mut self.command, &self.output)
     }
+}
+
+/// Whether a capture needs the render without capture, which takes as long again, or refuses the flag without it.
+fn draws_plainly(words: &[OsString]) -> bool {
+    let needing = ["--no-plain", "--image", "--auto", "--technique"];
+    words.iter().any(|word| {
+        let flag = word.to_str().unwrap_or_default();
+        needing.contains(&flag.split('=').next().unwrap_or_default())
+    })
 }
 
 /// Whether the command, the first argument of the program that is no flag, is `sample`.
@@ -144,7 +157,7 @@ mod tests {
         );
         let words: Vec<&OsStr> = capture.command.get_args().collect();
         assert_eq!(words[..2], ["raster", "-o"]);
-        assert_eq!(words[3..], ["--size", "64x64", "a.b.glb"]);
+        assert_eq!(words[3..], ["--no-plain", "--size", "64x64", "a.b.glb"]);
         let output = capture.output.clone();
         drop(capture);
         assert!(!output.parent().expect("a folder").exists());

@@ -19,7 +19,7 @@ use shell::{Output, Progress, note};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use techniques::{Planner, Skips};
-use textures::TextureSet;
+use textures::{TextureSet, alpha_tested};
 
 /// What is captured of a scene.
 pub(super) struct Session<'a> {
@@ -50,7 +50,13 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<String> {
     let (mut planned, finest) = session.plan()?;
     let searched = started.elapsed();
     let scene = &session.world.scene;
-    let textures = prepare_textures(scene, |image| finest[image], cache.as_ref())?;
+    // Records are of coordinates, so only alpha tests read texels.
+    let read = match session.reads_texels() {
+        true => vec![true; scene.images.len()],
+        false => alpha_tested(scene),
+    };
+    let finest = |image: usize| finest[image].filter(|_| read[image]);
+    let textures = prepare_textures(scene, finest, cache.as_ref())?;
     let textured = started.elapsed();
     let mut opened = session.open_driver(&textures)?;
     let backend = opened.backend.as_mut();
@@ -65,7 +71,7 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<String> {
     tables.passes = (planned.iter())
         .flat_map(|frame| frame.plan.passes(frame.number))
         .collect();
-    let texels = texels_note(&textures, searched - loaded);
+    let texels = texels_note(&textures, session.reads_texels(), searched - loaded);
     let counts = [textures.textures.len(), textures.cached, textures.unseen()];
     drop(textures);
     let mut summary = Summary::default();
@@ -152,6 +158,12 @@ impl<'a> Session<'a> {
                 || args.no_plain && args.image.is_some(),
             ..self.world.job(&self.planner)
         }
+    }
+
+    /// Whether all texels are prepared: for a picture, with capture or without, or because nothing is skipped.
+    fn reads_texels(&self) -> bool {
+        let job = self.job();
+        !self.args.no_plain || job.shaded || !job.skips.images
     }
 
     /// Plans all frames: their layers and draws, and the finest level of each image that they sample. Draws
@@ -326,14 +338,18 @@ fn capture(
 }
 
 /// Says which texels were prepared and which left out.
-fn texels_note(textures: &TextureSet, searched: Duration) -> String {
+fn texels_note(textures: &TextureSet, reads_texels: bool, searched: Duration) -> String {
     let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
     let formats: BTreeSet<String> = (textures.textures.iter())
         .map(|texture| format!("{:?}", texture.texture.format).to_uppercase())
         .collect();
     let formats: Vec<String> = formats.into_iter().collect();
+    let why = match reads_texels {
+        true => "that no view samples",
+        false => "that no alpha test reads",
+    };
     format!(
-        "{:.1} MiB of texels in {}; {:.1} MiB that no view samples skipped: {} images, and the finest levels of {} others (found in {:.2} s)",
+        "{:.1} MiB of texels in {}; {:.1} MiB {why} skipped: {} images, and the finest levels of {} others (found in {:.2} s)",
         mib(textures.bytes()),
         formats.join(", "),
         mib(textures.skipped_bytes()),

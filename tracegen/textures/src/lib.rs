@@ -23,6 +23,7 @@ mod role;
 mod tests;
 
 pub use cache::Cache;
+pub use role::alpha_tested;
 
 use cache::KeyHasher;
 use formats::error::{Broken, ensure};

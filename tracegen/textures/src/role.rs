@@ -20,6 +20,18 @@ pub(super) struct Role {
     pub normal_map: bool,
 }
 
+/// Whether alpha tests read each image.
+pub fn alpha_tested(scene: &Scene) -> Vec<bool> {
+    let mut tested = vec![false; scene.images.len()];
+    let masked = (scene.materials.iter()).filter(|of| matches!(of.alpha, AlphaMode::Mask(_)));
+    for texture in masked.filter_map(|of| of.textures[TextureSlot::BaseColor]) {
+        if let Some(tested) = tested.get_mut(texture.image) {
+            *tested = true;
+        }
+    }
+    tested
+}
+
 /// The role of each image; `None` for images that no placed mesh samples.
 ///
 /// If several materials use an image in different ways, its alpha gets the use that preserves most of it, and
