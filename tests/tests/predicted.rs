@@ -1,6 +1,6 @@
 //! Predictions of what orders save at a size that was not captured.
 
-use parallax_tests::{has_lavapipe, program, refuse, run_ok};
+use parallax_tests::{has_lavapipe, program, refuse, root, run_ok};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -145,4 +145,35 @@ fn a_prediction_comes_near_the_measured_saving() {
         of_preset("answer") && preset["config"]["line_bytes"] == 64,
         "{preset}"
     );
+}
+
+/// The interval is the largest error of the results files.
+#[test]
+fn the_interval_is_the_largest_measured_error() {
+    let largest = |file: &str| {
+        let path = root().join("results").join(file);
+        let text = std::fs::read_to_string(&path).expect("a results file");
+        let lines = text.lines().filter(|line| !line.starts_with('#'));
+        let text = lines.collect::<Vec<_>>().join("\n");
+        let mut rows = csv::Reader::from_reader(text.as_bytes());
+        let heading = rows.headers().expect("a heading").clone();
+        let column =
+            (heading.iter()).position(|name| name == "largest error outside knees, points");
+        let column = column.expect("a column of errors");
+        let errors = rows.records().map(|row| {
+            let row = row.expect("a row");
+            row[column].parse::<f64>().expect("an error")
+        });
+        errors.fold(0.0, f64::max)
+    };
+    let files = [
+        "sizes-coverage.csv",
+        "single-frame-summary.csv",
+        "single-frame-machines.csv",
+    ];
+    let largest = files.into_iter().map(largest).fold(0.0, f64::max);
+    let source = root().join("replay/studies/src/predict.rs");
+    let source = std::fs::read_to_string(source).expect("the source");
+    let expected = format!("LARGEST_ERROR_POINTS: f64 = {largest:.1};");
+    assert!(source.contains(&expected), "{expected}");
 }
