@@ -111,7 +111,7 @@ impl Profile {
         })
     }
 
-    /// An analysis of distances and first uses alone, which takes a third of the time.
+    /// An analysis of distances and first uses alone.
     ///
     /// # Errors
     /// An impossible cache.

@@ -62,6 +62,20 @@ pub(super) fn parse_orders(text: &str) -> Result<Vec<Order>> {
     parse_named(text)
 }
 
+/// Parses the order that savings are over, and others. Returns the former first.
+///
+/// # Errors
+/// An unknown order, or several baselines.
+pub(super) fn parse_over(baseline: &str, orders: &str) -> Result<Vec<Order>> {
+    let [first] = parse_named(baseline)?[..] else {
+        bail!("--baseline: expected one order, found `{baseline}`");
+    };
+    let mut orders = parse_named(orders)?;
+    orders.retain(|order| *order != first);
+    orders.insert(0, first);
+    Ok(orders)
+}
+
 /// Parses comma-separated orders without `all`.
 pub(super) fn parse_named(text: &str) -> Result<Vec<Order>> {
     let mut orders = Vec::new();

@@ -1,7 +1,7 @@
 //! `replay predict`: what orders save at a size that was not captured, from a capture at a smaller one.
 
 use super::experiment_args::{parse_caches, refuse_sizes};
-use super::order_arg::parse_named;
+use super::order_arg::parse_over;
 use super::outputs::ReplayArgs;
 use super::subjects::Traces;
 use anyhow::{Context, Result, bail, ensure};
@@ -62,7 +62,7 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Wrong arguments, traces of different views, or an output that cannot be written.
+/// Wrong arguments, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.replay.threads.start()?;
     let mut usual = RunConfig {
@@ -80,12 +80,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some([key, expected, found]) = not_predicted(&config) {
         bail!("{key}: expected {expected} with `replay predict`, found {found}");
     }
-    let [baseline] = parse_named(&args.baseline)?[..] else {
-        bail!("--baseline: expected one order, found `{}`", args.baseline);
-    };
-    let mut orders = parse_named(&args.orders)?;
-    orders.retain(|order| *order != baseline);
-    orders.insert(0, baseline);
+    let orders = parse_over(&args.baseline, &args.orders)?;
     ensure!(
         orders.len() > 1,
         "--orders: expected an order other than the baseline, found `{}`",

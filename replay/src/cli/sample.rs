@@ -3,7 +3,7 @@
 mod counts_file;
 
 use super::experiment_args::{parse_caches, refuse_varied};
-use super::order_arg::parse_named;
+use super::order_arg::parse_over;
 use super::outputs::ReplayArgs;
 use crate::files;
 use anyhow::{Context, Result, bail, ensure};
@@ -122,12 +122,7 @@ fn points(args: &Args) -> Result<Points> {
         base.frame.is_none(),
         "--frame: expected with `replay run`, found with `replay sample`, which counts texture traffic alone"
     );
-    let [baseline] = parse_named(&args.baseline)?[..] else {
-        bail!("--baseline: expected one order, found `{}`", args.baseline);
-    };
-    let mut orders = parse_named(&args.orders)?;
-    orders.retain(|order| *order != baseline);
-    orders.insert(0, baseline);
+    let orders = parse_over(&args.baseline, &args.orders)?;
     ensure!(
         args.of != Of::Saving || orders.len() > 1,
         "--orders: expected an order other than the baseline, found `{}`",

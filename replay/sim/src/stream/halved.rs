@@ -3,10 +3,10 @@
 //! Of each 2x2 quads one is kept. Its pixels stand twice as far apart, so its derivatives double and its samples read the
 //! next coarser level, as those of a quad of the smaller picture do. Coordinates are those of the kept quad.
 
-use super::regroup::{Rendered, rendered};
+use super::regroup::{Rendered, keep_quads, rendered};
 use super::{StreamError, TileSource};
 use crate::config::RunConfig;
-use formats::textrace::{PrimitiveRun, QuadRecord, Tables, Tile};
+use formats::textrace::{QuadRecord, Tables, Tile};
 use formats::view::TILE_SIZE_PX;
 
 /// See the module.
@@ -45,34 +45,16 @@ impl TileSource for Halved<'_> {
 
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         self.source.read_tile(pass, index, tile)?;
-        let (runs, records) = (std::mem::take(&mut tile.runs), &mut tile.records);
-        let mut kept = 0;
-        for run in runs {
-            let first = kept;
-            for index in run.first as usize..(run.first + run.count) as usize {
-                let record = records[index];
-                if (record.x | record.y) & 1 == 0 {
-                    // The write position never passes the read position, because runs are consecutive.
-                    records[kept] = QuadRecord {
-                        x: record.x / 2,
-                        y: record.y / 2,
-                        dx: record.dx.map(|d| d.saturating_mul(2)),
-                        dy: record.dy.map(|d| d.saturating_mul(2)),
-                        cross: record.cross.map(|c| c.saturating_mul(4)),
-                        ..record
-                    };
-                    kept += 1;
-                }
-            }
-            if kept > first {
-                tile.runs.push(PrimitiveRun {
-                    first: first as u32,
-                    count: (kept - first) as u32,
-                    ..run
-                });
-            }
-        }
-        records.truncate(kept);
+        keep_quads(tile, |record| {
+            ((record.x | record.y) & 1 == 0).then(|| QuadRecord {
+                x: record.x / 2,
+                y: record.y / 2,
+                dx: record.dx.map(|d| d.saturating_mul(2)),
+                dy: record.dy.map(|d| d.saturating_mul(2)),
+                cross: record.cross.map(|c| c.saturating_mul(4)),
+                ..record
+            })
+        });
         Ok(())
     }
 }

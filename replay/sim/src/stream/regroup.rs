@@ -98,31 +98,14 @@ impl Rendered<'_> {
         self.check_inside(pass, from, tile)?;
         let edge_quads = (self.tile_px / 2) as u8;
         let part = at.map(|place| (place % per_edge) as u8);
-        let (runs, records) = (std::mem::take(&mut tile.runs), &mut tile.records);
-        let mut kept = 0;
-        for run in runs {
-            let first = kept;
-            for index in run.first as usize..(run.first + run.count) as usize {
-                let record = records[index];
-                if [record.x / edge_quads, record.y / edge_quads] == part {
-                    // The write position never passes the read position, because runs are consecutive.
-                    records[kept] = QuadRecord {
-                        x: record.x % edge_quads,
-                        y: record.y % edge_quads,
-                        ..record
-                    };
-                    kept += 1;
-                }
-            }
-            if kept > first {
-                tile.runs.push(PrimitiveRun {
-                    first: first as u32,
-                    count: (kept - first) as u32,
-                    ..run
-                });
-            }
-        }
-        records.truncate(kept);
+        keep_quads(tile, |record| {
+            let is_inside = [record.x / edge_quads, record.y / edge_quads] == part;
+            is_inside.then(|| QuadRecord {
+                x: record.x % edge_quads,
+                y: record.y % edge_quads,
+                ..record
+            })
+        });
         Ok(())
     }
 
@@ -186,6 +169,30 @@ impl Rendered<'_> {
             });
         }
     }
+}
+
+/// Keeps the quads of a tile for which `kept` returns a record, as that record.
+pub(super) fn keep_quads(tile: &mut Tile, kept: impl Fn(QuadRecord) -> Option<QuadRecord>) {
+    let (runs, records) = (std::mem::take(&mut tile.runs), &mut tile.records);
+    let mut end = 0;
+    for run in runs {
+        let first = end;
+        for index in run.first as usize..(run.first + run.count) as usize {
+            if let Some(record) = kept(records[index]) {
+                // The write position never passes the read position, because runs are consecutive.
+                records[end] = record;
+                end += 1;
+            }
+        }
+        if end > first {
+            tile.runs.push(PrimitiveRun {
+                first: first as u32,
+                count: (end - first) as u32,
+                ..run
+            });
+        }
+    }
+    records.truncate(end);
 }
 
 /// The positions of a square grid along the Morton curve; `edge` is a power of two.
