@@ -90,7 +90,7 @@ def draw(study, found):
     parts.append(svg_text(LEFT + WIDTH / 2, TOP + HEIGHT + 40, "processor time over that of capturing and replaying everything", 12, FAINT, "middle"))
     parts.append(svg_text(-TOP - HEIGHT / 2, 20, "largest error, points (0.01 or less at the bottom)", 12, FAINT, "middle", more=' transform="rotate(-90)"'))
     x, y = place(1, 0)
-    parts += [f'<rect x="{x - 6:.1f}" y="{y - 6:.1f}" width="12" height="12" fill="{INK}"/>', svg_text(round(x + 12, 1), y - 10, "everything, timed", 12)]
+    parts += [f'<rect x="{x - 6:.1f}" y="{y - 6:.1f}" width="12" height="12" fill="{INK}"/>', svg_text(round(x, 1), y - 14, "everything, timed", 12, anchor="middle")]
     medians = {}
     for number, (way, title) in enumerate(WAYS.items()):
         for time, points in found[way]:
